@@ -1,0 +1,68 @@
+"""The command `drivetwin`."""
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from twin._checks import InputError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code: 0 done, 2 input that cannot be used.
+
+    Args:
+        arguments: command line without the program's name; the process's own if not given.
+    """
+    options = _parser().parse_args(arguments)
+    # Packages never change JAX's configuration; the program that uses them does.
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    try:
+        options.out.mkdir(parents=True, exist_ok=True)
+        print(options.run(options.out))
+    except (InputError, OSError) as error:
+        print(f"drivetwin: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="drivetwin", description="Differentiable twins of feed drives: measurements in, parameters with error bars out."
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    demo = commands.add_parser("demo", help="identify a simulated servo axis from noisy records")
+    _add_run(demo, _demo, "out/demo")
+    reproduce = commands.add_parser("reproduce", help="repeat a published identification on its measured data")
+    studies = reproduce.add_subparsers(required=True, metavar="STUDY")
+    emps = studies.add_parser("emps", help="EMPS ball-screw axis: inverse dynamics and output error")
+    _add_run(emps, _emps, "out/emps")
+    bench = studies.add_parser("two-inertia", help="two-inertia bench: two-mass drive from its frequency response")
+    _add_run(bench, _two_inertia, "out/two-inertia")
+    return parser
+
+
+def _add_run(parser: argparse.ArgumentParser, run: Callable[[Path], str], out: str) -> None:
+    parser.add_argument("--out", type=Path, default=Path(out), metavar="DIR", help="folder for the results (%(default)s)")
+    parser.set_defaults(run=run)
+
+
+# Imported when asked for: the command's help must not wait for JAX and matplotlib.
+def _demo(out: Path) -> str:
+    from fitting.demo import run_demo
+
+    return run_demo(out)
+
+
+def _emps(out: Path) -> str:
+    from fitting.identification.emps import reproduce_emps
+
+    return reproduce_emps(out)
+
+
+def _two_inertia(out: Path) -> str:
+    from fitting.identification.two_inertia_report import reproduce_two_inertia, summarise
+
+    return f"{summarise(reproduce_two_inertia(out))}\nResults in {out}"

@@ -1,0 +1,240 @@
+"""What a fit returns."""
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from scipy import stats
+
+from fitting.solvers.levenberg_marquardt import Stop
+from twin._checks import InputError
+from twin.parameters import Parameter, ParameterSpace
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_ARRAYS = ("values", "scaled", "scaled_covariance", "unseen", "active", "residual", "cost_history")
+_FORMAT = 1
+
+
+class Estimate(NamedTuple):
+    """One estimated parameter."""
+
+    value: float
+    """Estimate, SI."""
+    standard_error: float
+    """Standard error; NaN where the parameter sits on a bound or is not seen by the data."""
+    unit: str
+    """Unit."""
+
+
+@dataclasses.dataclass(frozen=True)
+class FitResult:
+    """A fitted model, with what is known about its parameters. Shows itself as a table in a notebook."""
+
+    model: Any
+    """The fitted model."""
+    space: ParameterSpace
+    """The free parameters."""
+    values: np.ndarray
+    """Estimates in SI (parameters,)."""
+    scaled: np.ndarray
+    """Estimates as the solver's scaled vector (parameters,)."""
+    scaled_covariance: np.ndarray
+    """Covariance of the scaled vector (parameters, parameters)."""
+    condition_number: float
+    """Condition of the column-normalised Jacobian; above some 1e4 parameters trade places with each other."""
+    degrees_of_freedom: int
+    """Residuals minus freely moving parameters."""
+    unseen: np.ndarray
+    """Which parameters the data do not see (parameters,)."""
+    active: np.ndarray
+    """Which parameters sit on a bound that holds them back (parameters,)."""
+    residual: np.ndarray
+    """Weighted residual at the end (residuals,)."""
+    cost_history: np.ndarray
+    """Half the sum of squared residuals, before and after each step."""
+    steps: int
+    """Steps taken."""
+    stop: str
+    """Name of the reason for stopping, one of `Stop`."""
+    offset: float
+    """Relative offset at the end: how much of the residual the linear model could still remove."""
+    warning: str = ""
+    """What else the procedure has to say about this fit."""
+
+    @property
+    def success(self) -> bool:
+        """Whether the fit converged."""
+        return self.stop in ("converged", "at_precision")
+
+    @property
+    def message(self) -> str:
+        """What happened, and what to do about it."""
+        parts = [str(Stop[getattr(Stop, self.stop)])]
+        if self.active.any():
+            parts.append(
+                f"On a bound: {self._named(self.active)}; their standard errors are not given. Widen the bounds if they "
+                "are not physical."
+            )
+        if self.unseen.any():
+            parts.append(
+                f"Not determined by these data: {self._named(self.unseen)}. Hold some fixed, give priors, or measure "
+                "something that sees them."
+            )
+        elif self.condition_number > 1e6:
+            parts.append(
+                f"The condition number {self.condition_number:.1e} is high: some parameters trade places with each other; "
+                "look at the correlation."
+            )
+        return " ".join([*parts, self.warning]).strip()
+
+    @property
+    def cost(self) -> float:
+        """Half the sum of squared residuals."""
+        return 0.5 * float(self.residual @ self.residual)
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Covariance of the estimates in SI (parameters, parameters)."""
+        slopes = np.asarray(self.space.slopes(jnp.asarray(self.values)))
+        return self.scaled_covariance * np.outer(slopes, slopes)
+
+    @property
+    def standard_errors(self) -> np.ndarray:
+        """Standard errors in SI (parameters,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> np.ndarray:
+        """Correlation of the estimates (parameters, parameters)."""
+        error = np.sqrt(np.diag(self.scaled_covariance))
+        return self.scaled_covariance / np.outer(error, error)
+
+    def intervals(self, level: float = 0.95) -> np.ndarray:
+        """Confidence intervals in SI (parameters, 2), by Student's t on the scale of each parameter.
+
+        On a log scale the interval is therefore unsymmetric and stays positive. NaN where a parameter sits on a bound or
+        is not seen.
+
+        Args:
+            level: confidence, between 0 and 1.
+
+        Raises:
+            InputError: level outside (0, 1).
+        """
+        if not 0 < level < 1:
+            raise InputError(f"level must be between 0 and 1, but is {level}.")
+        if self.degrees_of_freedom < 1:
+            return np.full((len(self.space), 2), np.nan)
+        reach = stats.t.ppf(0.5 + level / 2, self.degrees_of_freedom) * np.sqrt(np.diag(self.scaled_covariance))
+        ends = [np.asarray(self.space.unscaled(jnp.asarray(self.scaled + side * reach))) for side in (-1, 1)]
+        return np.stack(ends, axis=1)
+
+    def __getitem__(self, path: str) -> Estimate:
+        if path not in self.space.paths:
+            raise InputError(f"{path!r} was not fitted; fitted were {', '.join(self.space.paths)}.")
+        i = self.space.paths.index(path)
+        return Estimate(float(self.values[i]), float(self.standard_errors[i]), self.space.units[i])
+
+    def estimates(self) -> dict[str, Estimate]:
+        """All estimates by path."""
+        return {path: self[path] for path in self.space.paths}
+
+    def to_dataframe(self, level: float = 0.95) -> "pd.DataFrame":
+        """Table of the estimates: unit, value, standard error, interval, bounds, remark.
+
+        Args:
+            level: confidence of the intervals.
+        """
+        import pandas as pd
+
+        low, high = self.intervals(level).T
+        return pd.DataFrame(
+            {
+                "unit": self.space.units,
+                "estimate": self.values,
+                "standard error": self.standard_errors,
+                f"{100 * level:g} % from": low,
+                f"{100 * level:g} % to": high,
+                "lower bound": [p.lower for p in self.space.parameters],
+                "upper bound": [p.upper for p in self.space.parameters],
+                "remark": [self._remark(i) for i in range(len(self.space))],
+            },
+            index=pd.Index(self.space.paths, name="parameter"),
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Save everything but the model's structure to one `.npz` file, without pickle.
+
+        Args:
+            path: file to write; the ending .npz is added if missing.
+        """
+        parameters = [
+            {f.name: getattr(p, f.name) for f in dataclasses.fields(p)} for p in self.space.parameters
+        ]
+        head = {
+            "format": _FORMAT,
+            "parameters": parameters,
+            "condition_number": self.condition_number,
+            "degrees_of_freedom": self.degrees_of_freedom,
+            "steps": self.steps,
+            "stop": self.stop,
+            "offset": self.offset,
+            "warning": self.warning,
+        }
+        np.savez(path, head=np.asarray(json.dumps(head)), **{name: getattr(self, name) for name in _ARRAYS})
+
+    @classmethod
+    def load(cls, path: str | Path, model: Any) -> "FitResult":
+        """Load a saved result.
+
+        Args:
+            path: file written by `save`.
+            model: a model of the structure that was fitted; its free parameters are set to the estimates.
+
+        Returns:
+            The result, equal to the one saved.
+
+        Raises:
+            InputError: file missing, damaged or not a saved result; model without the parameters.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                head = json.loads(str(file["head"]))
+                arrays = {name: file[name] for name in _ARRAYS}
+        except Exception as error:
+            raise InputError(f"{path} is not a readable fit result ({error}). Save it again by FitResult.save.") from error
+        if head.pop("format") != _FORMAT:
+            raise InputError(f"{path} was written by another version of drivetwin. Fit again, or use that version.")
+        parameters = []
+        for entry in head.pop("parameters"):
+            prior = entry.pop("prior")
+            parameters.append(Parameter(**entry, prior=None if prior is None else tuple(prior)))
+        space = ParameterSpace(parameters)
+        fitted = space.with_values(model, jnp.asarray(arrays["values"]))
+        return cls(model=fitted, space=space, **arrays, **head)
+
+    def _repr_html_(self) -> str:
+        state = "converged" if self.success else "NOT converged"
+        table = self.to_dataframe().to_html(float_format=lambda x: f"{x:.6g}")
+        facts = (
+            f"{state} in {self.steps} steps, cost {self.cost:.6g}, {self.degrees_of_freedom} degrees of freedom, "
+            f"condition number {self.condition_number:.3g}"
+        )
+        return f"<div><p><b>Fit</b>: {facts}.</p><p>{self.message}</p>{table}</div>"
+
+    def __str__(self) -> str:
+        table = self.to_dataframe().to_string(float_format=lambda x: f"{x:.6g}")
+        return f"{table}\n{self.message}"
+
+    def _named(self, mask: np.ndarray) -> str:
+        return ", ".join(path for path, named in zip(self.space.paths, mask, strict=True) if named)
+
+    def _remark(self, i: int) -> str:
+        if self.active[i]:
+            return "at a bound"
+        return "not determined" if self.unseen[i] else ""

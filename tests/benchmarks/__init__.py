@@ -1,0 +1,1 @@
+"""Speed of the twin against other tools, as ratios within one run."""

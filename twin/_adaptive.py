@@ -1,0 +1,158 @@
+"""Error-controlled integration by diffrax, with forward sensitivities integrated together with the state."""
+
+from collections.abc import Callable
+from typing import Any
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Bool, Float, PyTree
+
+from twin.plant import AbstractPlant
+from twin.references import AbstractReference
+from twin.stepping import AdaptiveSteps
+
+
+def solve_adaptive(
+    plant: AbstractPlant,
+    reference: AbstractReference,
+    state: PyTree[Array],
+    times: Float[Array, "times"],
+    stepping: AdaptiveSteps,
+) -> tuple[PyTree[Array], Bool[Array, ""]]:
+    """States at the times, and whether the integrator gave up before the end."""
+    if stepping.gradient == "reverse":
+        return _integrate(_field(plant, reference), state, times, reference, stepping)
+
+    # The derivative rule sees one flat tuple of arrays; everything else is closed over.
+    varied, fixed = eqx.partition((plant, reference, state), eqx.is_inexact_array)
+    settings, options = eqx.partition((times, stepping), eqx.is_array)
+
+    def rebuild(arrays: PyTree[Array]) -> tuple[AbstractPlant, AbstractReference, PyTree[Array]]:
+        return eqx.combine(arrays, fixed)
+
+    @jax.custom_jvp
+    def solve(arrays: PyTree[Array], settings: PyTree[Array]) -> tuple[PyTree[Array], Bool[Array, ""]]:
+        plant, reference, state = rebuild(arrays)
+        times, stepping = eqx.combine(settings, options)
+        return _integrate(_field(plant, reference), state, times, reference, stepping)
+
+    def with_directions(
+        arrays: PyTree[Array], directions: PyTree[Array], axes: PyTree[int | None], settings: PyTree[Array]
+    ) -> tuple[PyTree[Array], Bool[Array, ""], PyTree[Array]]:
+        """State and its derivative along several directions at once; `axes` says which leaves differ between them."""
+        plant, reference, state = rebuild(arrays)
+        times, stepping = eqx.combine(settings, options)
+        # A direction stands for about 100 % of its parameters, so that state and sensitivity share one tolerance.
+        size = jax.vmap(lambda d: _relative_size(arrays, d), in_axes=(axes,))(directions)
+
+        def flow(arrays: PyTree[Array], t: Array, y: PyTree[Array]) -> PyTree[Array]:
+            plant, reference, _ = rebuild(arrays)
+            return plant.vector_field(t, y, reference(t))
+
+        def augmented(t: Array, y: Any) -> Any:
+            value, sensitivity = y
+            rate, derivative = jax.linearize(lambda a, v: flow(a, t, v), arrays, value)
+
+            def along(direction: PyTree[Array], scale: Array, s: PyTree[Array]) -> PyTree[Array]:
+                return derivative(jax.tree.map(lambda d: d / scale, direction), s)
+
+            return rate, jax.vmap(along, in_axes=(axes, 0, 0))(directions, size, sensitivity)
+
+        def at_start(direction: PyTree[Array], scale: Array) -> PyTree[Array]:
+            _, d_state = jax.jvp(lambda a: rebuild(a)[2], (arrays,), (direction,))
+            return jax.tree.map(lambda d: d / scale, d_state)
+
+        sensitivity = jax.vmap(at_start, in_axes=(axes, 0))(directions, size)
+        (states, sensitivities), gave_up = _integrate(augmented, (state, sensitivity), times, reference, stepping)
+        # Saved times lead; directions go first, as vmap wants them.
+        unscaled = jax.tree.map(lambda s: jnp.moveaxis(s, 1, 0) * _fit(size, s.ndim), sensitivities)
+        return states, gave_up, unscaled
+
+    @jax.custom_batching.custom_vmap
+    def along_one(
+        arrays: PyTree[Array], direction: PyTree[Array], settings: PyTree[Array]
+    ) -> tuple[PyTree[Array], Bool[Array, ""], PyTree[Array]]:
+        directions = jax.tree.map(lambda d: d[None], direction)
+        states, gave_up, tangents = with_directions(arrays, directions, jax.tree.map(lambda _: 0, directions), settings)
+        return states, gave_up, jax.tree.map(lambda s: s[0], tangents)
+
+    @along_one.def_vmap
+    def along_many(size: int, batched: Any, arrays: Any, direction: Any, settings: Any) -> Any:
+        # A Jacobian (only the directions differ) integrates the state once with all its sensitivities. A batch of
+        # models is an ordinary batch.
+        in_axes = jax.tree.map(lambda b: 0 if b else None, batched)
+        if any(jax.tree.leaves((batched[0], batched[2]))):
+            out = jax.vmap(along_one.fun, in_axes=in_axes, axis_size=size)(arrays, direction, settings)
+            return out, jax.tree.map(lambda _: True, out)
+        states, gave_up, tangents = with_directions(arrays, direction, in_axes[1], settings)
+        out = (states, gave_up, tangents)
+        flags = (jax.tree.map(lambda _: False, states), False, jax.tree.map(lambda _: True, tangents))
+        return out, flags
+
+    @solve.defjvp
+    def solve_jvp(primals: Any, tangents: Any) -> Any:
+        arrays, settings = primals
+        states, gave_up, derivative = along_one(arrays, tangents[0], settings)
+        return (states, gave_up), (derivative, _no_tangent(gave_up))
+
+    return solve(varied, settings)
+
+
+def _field(plant: AbstractPlant, reference: AbstractReference) -> Callable:
+    return lambda t, y: plant.vector_field(t, y, reference(t))
+
+
+def _integrate(
+    field: Callable, state: PyTree[Array], times: Array, reference: AbstractReference, stepping: AdaptiveSteps
+) -> tuple[PyTree[Array], Bool[Array, ""]]:
+    controller = diffrax.PIDController(
+        rtol=stepping.rtol, atol=stepping.atol, norm=optx.max_norm, dtmin=stepping.min_step, force_dtmin=False
+    )
+    # What a reference returns is continuous, so a moving switching time adds nothing of its own to a derivative.
+    knots = jax.lax.stop_gradient(reference.switching_times())
+    if knots.shape[0] > 0:
+        controller = diffrax.ClipStepSizeController(controller, jump_ts=knots)
+    reverse = stepping.gradient == "reverse"
+    # The integrator sees the leaves alone: empty tuples in a state (a law without memory) trip its buffers.
+    leaves, structure = jax.tree.flatten(state)
+
+    def rates(t: Array, y: list[Array], args: Any) -> list[Array]:
+        del args
+        return jax.tree.leaves(field(t, jax.tree.unflatten(structure, y)))
+
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(rates),
+        stepping.solver,
+        t0=times[0],
+        t1=times[-1],
+        dt0=None,
+        y0=leaves,
+        saveat=diffrax.SaveAt(ts=times),
+        stepsize_controller=controller,
+        max_steps=stepping.max_steps,
+        throw=False,
+        adjoint=diffrax.RecursiveCheckpointAdjoint() if reverse else diffrax.ForwardMode(),
+    )
+    return jax.tree.unflatten(structure, solution.ys), solution.result != diffrax.RESULTS.successful
+
+
+def _relative_size(arrays: PyTree[Array], direction: PyTree[Array]) -> Float[Array, ""]:
+    """The largest relative change of any parameter along a direction; 1 for no change at all."""
+
+    def largest(value: Array, change: Array) -> Array:
+        return jnp.max(jnp.abs(change) / jnp.where(value == 0, 1.0, jnp.abs(value)), initial=0.0)
+
+    size = jnp.max(jnp.stack(jax.tree.leaves(jax.tree.map(largest, arrays, direction))))
+    return jnp.where(size > 0, size, 1.0)
+
+
+def _fit(size: Array, ndim: int) -> Array:
+    return size.reshape(size.shape + (1,) * (ndim - 1))
+
+
+def _no_tangent(flag: Array) -> Any:
+    return np.zeros(flag.shape, dtype=jax.dtypes.float0)

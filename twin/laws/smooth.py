@@ -1,0 +1,67 @@
+"""Smooth stand-ins for the sign, the magnitude and powers of the magnitude.
+
+All of them are infinitely differentiable in the value, also at zero, and approach the sharp function as (w/v)² once
+|v| is well above the width w. The width has the unit of the value, so that it can be read and chosen: the speed below
+which a direction of motion is no longer told from standstill.
+"""
+
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Float
+
+# Beyond this ratio of value to width the smooth and the sharp function are equal to the last digit, and the squares
+# below are not far from overflow.
+_SHARP = 1e50
+
+
+def smooth_sign(value: Float[ArrayLike, "*batch"], width: Float[ArrayLike, ""]) -> Float[Array, "*batch"]:
+    """Direction of a value: v / √(v² + w²), odd, from -1 to 1.
+
+    Args:
+        value: v, any shape, any unit.
+        width: w, positive, in the unit of v. At v = w the result is 1/√2.
+
+    Returns:
+        The smooth sign, in the shape of v.
+    """
+    sharp, value_inside, width_inside = _guarded(value, width)
+    return jnp.where(sharp, jnp.sign(value), value_inside / jnp.sqrt(value_inside**2 + width_inside**2))
+
+
+def smooth_abs(value: Float[ArrayLike, "*batch"], width: Float[ArrayLike, ""]) -> Float[Array, "*batch"]:
+    """Magnitude of a value: √(v² + w²), even, never below w.
+
+    It goes with `smooth_sign`: smooth_sign(v) · smooth_abs(v) = v exactly.
+
+    Args:
+        value: v, any shape, any unit.
+        width: w, positive, in the unit of v; the value at v = 0.
+
+    Returns:
+        The smooth magnitude in the unit and shape of v.
+    """
+    sharp, value_inside, width_inside = _guarded(value, width)
+    return jnp.where(sharp, jnp.abs(value), jnp.sqrt(value_inside**2 + width_inside**2))
+
+
+def smooth_power(
+    value: Float[ArrayLike, "*batch"], width: Float[ArrayLike, ""], exponent: Float[ArrayLike, ""]
+) -> Float[Array, "*batch"]:
+    """Power of the magnitude |v|^δ, as v² (v² + w²)^(δ/2 - 1): even, zero at v = 0, increasing in |v|.
+
+    The sharp power has an infinite slope at zero for δ < 1 and an infinite curvature for δ < 2; this one has neither.
+
+    Args:
+        value: v, any shape, any unit.
+        width: w, positive, in the unit of v.
+        exponent: δ [-], positive.
+
+    Returns:
+        The smooth power in the shape of v.
+    """
+    return smooth_sign(value, width) ** 2 * smooth_abs(value, width) ** exponent
+
+
+def _guarded(value: ArrayLike, width: ArrayLike) -> tuple[Array, Array, Array]:
+    # What is not selected must not overflow either: its derivative would be infinity times zero.
+    sharp = jnp.abs(value) > _SHARP * width
+    return sharp, jnp.where(sharp, 1.0, value), jnp.where(sharp, 1.0, width)

@@ -1,0 +1,197 @@
+"""Which parameters of a model are free, with their units, bounds and scales."""
+
+from collections.abc import Iterable
+from typing import Any, TypeVar
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from twin._checks import InputError, is_concrete, require_x64
+from twin.paths import get_leaf, set_leaves
+
+Model = TypeVar("Model")
+
+
+class Parameter(eqx.Module):
+    """One free parameter: where it is in the model, its unit, bounds and scale."""
+
+    path: str = eqx.field(static=True)
+    """Dotted path into the model, `friction.coulomb`; an index picks an element of a tuple or vector."""
+    unit: str = eqx.field(static=True, default="")
+    """Unit of the value, for tables and files; values are SI."""
+    lower: float = eqx.field(static=True, default=-float("inf"))
+    """Lower bound, in the unit."""
+    upper: float = eqx.field(static=True, default=float("inf"))
+    """Upper bound, in the unit."""
+    scale: str = eqx.field(static=True, default="linear")
+    """"linear": the fit moves value / size. "log": it moves ln(value); the value stays positive."""
+    size: float | None = eqx.field(static=True, default=None)
+    """Typical magnitude of the value on the linear scale; if not given, its bounds' range or else 1."""
+    prior: tuple[float, float] | None = eqx.field(static=True, default=None)
+    """Mean and standard deviation of a Gaussian prior, in the unit."""
+
+    def __check_init__(self):
+        if self.scale not in ("linear", "log"):
+            raise InputError(f'{self.path}: scale must be "linear" or "log", but is {self.scale!r}.')
+        if np.isnan(self.lower) or np.isnan(self.upper):
+            raise InputError(f"{self.path}: a bound is NaN. Use infinity where there is no bound.")
+        if not self.lower < self.upper:
+            raise InputError(
+                f"{self.path}: the lower bound {self.lower:g} is not below the upper bound {self.upper:g} {self.unit}. "
+                "Exchange them, or leave the parameter out of the space to hold it fixed."
+            )
+        if self.scale == "log" and self.lower < 0:
+            object.__setattr__(self, "lower", 0.0) if np.isneginf(self.lower) else _refuse_log(self)
+        if self.size is not None and not (np.isfinite(self.size) and self.size > 0):
+            raise InputError(f"{self.path}: size must be positive and finite, but is {self.size}.")
+        if self.prior is not None and not (np.all(np.isfinite(self.prior)) and self.prior[1] > 0):
+            raise InputError(f"{self.path}: prior must be (mean, positive standard deviation), but is {self.prior}.")
+
+    def to_scaled(self, value: ArrayLike) -> Float[Array, "..."]:
+        """From the value in SI to the variable that a solver moves."""
+        value = jnp.asarray(value)
+        return jnp.log(value) if self.scale == "log" else value / self._size()
+
+    def from_scaled(self, scaled: ArrayLike) -> Float[Array, "..."]:
+        """From the variable that a solver moves to the value in SI."""
+        scaled = jnp.asarray(scaled)
+        return jnp.exp(scaled) if self.scale == "log" else scaled * self._size()
+
+    def slope(self, value: ArrayLike) -> Float[Array, "..."]:
+        """Derivative of the value with respect to the scaled variable."""
+        value = jnp.asarray(value)
+        return value if self.scale == "log" else jnp.full_like(value, self._size())
+
+    def _size(self) -> float:
+        if self.size is not None:
+            return self.size
+        span = self.upper - self.lower
+        return span if np.isfinite(span) else 1.0
+
+
+class ParameterSpace(eqx.Module):
+    """An ordered set of free parameters of a model: the bridge between a model and a solver's vector."""
+
+    parameters: tuple[Parameter, ...]
+    """The free parameters, in the order of the vector."""
+
+    def __init__(self, parameters: Iterable[Parameter]):
+        self.parameters = tuple(parameters)
+
+    def __check_init__(self):
+        if not self.parameters:
+            raise InputError("A parameter space needs at least one parameter.")
+        seen = set()
+        for path in self.paths:
+            if path in seen:
+                raise InputError(f"Parameter {path!r} is in the space twice. Remove one.")
+            seen.add(path)
+
+    def __len__(self) -> int:
+        return len(self.parameters)
+
+    def __getitem__(self, path: str) -> Parameter:
+        for parameter in self.parameters:
+            if parameter.path == path:
+                return parameter
+        raise InputError(f"No free parameter {path!r}; the space has {', '.join(self.paths)}.")
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Dotted paths, in order."""
+        return tuple(p.path for p in self.parameters)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units, in order."""
+        return tuple(p.unit for p in self.parameters)
+
+    @property
+    def lower(self) -> Float[Array, "parameters"]:
+        """Lower bounds of the scaled vector."""
+        return self._scaled_bounds("lower")
+
+    @property
+    def upper(self) -> Float[Array, "parameters"]:
+        """Upper bounds of the scaled vector."""
+        return self._scaled_bounds("upper")
+
+    def values(self, model: Any) -> Float[Array, "parameters"]:
+        """The free parameters' values in a model, SI.
+
+        Raises:
+            InputError: if a path is not in the model.
+        """
+        require_x64()
+        return jnp.stack([jnp.asarray(get_leaf(model, path)) for path in self.paths])
+
+    def with_values(self, model: Model, values: Float[Array, "parameters"]) -> Model:
+        """The model with its free parameters set to values in SI."""
+        return set_leaves(model, {path: values[i] for i, path in enumerate(self.paths)})
+
+    def pack(self, model: Any) -> Float[Array, "parameters"]:
+        """The scaled vector of a model's free parameters."""
+        return self.scaled(self.values(model))
+
+    def unpack(self, model: Model, vector: Float[Array, "parameters"]) -> Model:
+        """The model with its free parameters taken from a scaled vector."""
+        return self.with_values(model, self.unscaled(vector))
+
+    def scaled(self, values: Float[Array, "parameters"]) -> Float[Array, "parameters"]:
+        """Values in SI to the scaled vector."""
+        return jnp.stack([p.to_scaled(v) for p, v in zip(self.parameters, values, strict=True)])
+
+    def unscaled(self, vector: Float[Array, "parameters"]) -> Float[Array, "parameters"]:
+        """The scaled vector to values in SI."""
+        return jnp.stack([p.from_scaled(v) for p, v in zip(self.parameters, vector, strict=True)])
+
+    def slopes(self, values: Float[Array, "parameters"]) -> Float[Array, "parameters"]:
+        """Derivatives of the values with respect to the scaled vector."""
+        return jnp.stack([p.slope(v) for p, v in zip(self.parameters, values, strict=True)])
+
+    def subset(self, paths: Iterable[str]) -> "ParameterSpace":
+        """The space of some of the parameters.
+
+        Raises:
+            InputError: if a path is not in the space.
+        """
+        return ParameterSpace([self[path] for path in paths])
+
+    def prior_residual(self, values: Float[Array, "parameters"]) -> Float[Array, "priors"]:
+        """(value - mean) / standard deviation of every parameter that has a prior."""
+        rows = [(v - p.prior[0]) / p.prior[1] for p, v in zip(self.parameters, values, strict=True) if p.prior]
+        return jnp.stack(rows) if rows else jnp.zeros((0,))
+
+    def check_start(self, model: Any) -> None:
+        """Raise unless the model's values are finite and within the bounds.
+
+        Raises:
+            InputError: naming the parameter, its value and its bounds.
+        """
+        values = self.values(model)
+        if not is_concrete(values):
+            return
+        for parameter, value in zip(self.parameters, np.asarray(values), strict=True):
+            if not np.isfinite(value):
+                raise InputError(f"The start of {parameter.path} is {value}. Give the model a finite value.")
+            inside = parameter.lower <= value <= parameter.upper
+            if not inside or (parameter.scale == "log" and value <= 0):
+                raise InputError(
+                    f"The start of {parameter.path} is {value:g} {parameter.unit}, outside its bounds "
+                    f"[{parameter.lower:g}, {parameter.upper:g}]. Move the start inside, or widen the bounds."
+                )
+
+    def _scaled_bounds(self, side: str) -> Float[Array, "parameters"]:
+        require_x64()
+        values = jnp.asarray([getattr(p, side) for p in self.parameters], dtype=jnp.float64)
+        return self.scaled(values)
+
+
+def _refuse_log(parameter: Parameter) -> None:
+    raise InputError(
+        f"{parameter.path}: the lower bound {parameter.lower:g} is negative, but the scale is log. "
+        "Use a lower bound of at least zero, or the linear scale."
+    )
+

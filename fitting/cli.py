@@ -30,7 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="drivetwin", description="Differentiable twins of feed drives: measurements in, parameters with error bars out."
+        prog="drivetwin",
+        description="Differentiable twins of feed drives: measurements in, parameters with error bars out.",
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     demo = commands.add_parser("demo", help="identify a simulated servo axis from noisy records")
@@ -45,7 +46,9 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_run(parser: argparse.ArgumentParser, run: Callable[[Path], str], out: str) -> None:
-    parser.add_argument("--out", type=Path, default=Path(out), metavar="DIR", help="folder for the results (%(default)s)")
+    parser.add_argument(
+        "--out", type=Path, default=Path(out), metavar="DIR", help="folder for the results (%(default)s)"
+    )
     parser.set_defaults(run=run)
 
 
@@ -63,6 +66,17 @@ def _emps(out: Path) -> str:
 
 
 def _two_inertia(out: Path) -> str:
-    from fitting.identification.two_inertia_report import reproduce_two_inertia, summarise
+    from fitting.identification.two_inertia_report import reproduce_two_inertia
 
-    return f"{summarise(reproduce_two_inertia(out))}\nResults in {out}"
+    summary = reproduce_two_inertia(out)
+    lines = ["Two-mass drive fitted to record A, in units of the torque constant"]
+    for path, estimate in summary["fit"]["parameters"].items():
+        lines.append(f"  {path:24} {estimate['value']:12.5g} ± {estimate['standard_error']:.2g} {estimate['unit']}")
+    for source in ("model fitted to A, undamped", "record B, regression"):
+        pair = summary["frequencies"][source]
+        resonance, antiresonance = pair["resonance"]["value"], pair["antiresonance"]["value"]
+        lines.append(f"{source}: resonance {resonance:.2f} Hz, antiresonance {antiresonance:.2f} Hz")
+    for record, errors in summary["log-magnitude error"].items():
+        for name, error in errors.items():
+            lines.append(f"log-magnitude error {record}, {name}: median {error['median']:.4f}, rms {error['rms']:.4f}")
+    return "\n".join([*lines, f"Results in {out}"])

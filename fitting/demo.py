@@ -103,7 +103,7 @@ def run_demo(out: Path) -> str:
     table.insert(1, "true", list(true_values.values()))
     _write(out, result, true_values, seconds)
     _draw(out, record, result, reference, true_values)
-    text = table.to_string(float_format=lambda x: f"{x:.6g}")
+    text = table.round(7).to_string()
     return f"{text}\n{result.message}\n{seconds:.1f} s; results in {out}"
 
 

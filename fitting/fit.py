@@ -61,8 +61,8 @@ def fit(
         The fitted model with estimates, their uncertainty and a status.
 
     Raises:
-        InputError: unknown path, start outside its bounds, fewer data than parameters, residual not finite at the start;
-            with `throw`, a fit that did not converge.
+        InputError: unknown path, start outside its bounds, fewer data than parameters; with `throw`, a fit that did not
+            converge.
     """
     require_x64()
     space.check_start(model)

@@ -77,8 +77,8 @@ class FitResult:
         parts = [str(Stop[getattr(Stop, self.stop)])]
         if self.active.any():
             parts.append(
-                f"On a bound: {self._named(self.active)}; their standard errors are not given. Widen the bounds if they "
-                "are not physical."
+                f"On a bound: {self._named(self.active)}; their standard errors are not given. "
+                "Widen the bounds if they are not physical."
             )
         if self.unseen.any():
             parts.append(
@@ -87,8 +87,8 @@ class FitResult:
             )
         elif self.condition_number > 1e6:
             parts.append(
-                f"The condition number {self.condition_number:.1e} is high: some parameters trade places with each other; "
-                "look at the correlation."
+                f"The condition number {self.condition_number:.1e} is high: some parameters trade places with each "
+                "other; look at the correlation."
             )
         return " ".join([*parts, self.warning]).strip()
 
@@ -117,8 +117,8 @@ class FitResult:
     def intervals(self, level: float = 0.95) -> np.ndarray:
         """Confidence intervals in SI (parameters, 2), by Student's t on the scale of each parameter.
 
-        On a log scale the interval is therefore unsymmetric and stays positive. NaN where a parameter sits on a bound or
-        is not seen.
+        On a log scale the interval is therefore unsymmetric and stays positive. NaN where a parameter sits on a bound
+        or is not seen.
 
         Args:
             level: confidence, between 0 and 1.
@@ -173,9 +173,7 @@ class FitResult:
         Args:
             path: file to write; the ending .npz is added if missing.
         """
-        parameters = [
-            {f.name: getattr(p, f.name) for f in dataclasses.fields(p)} for p in self.space.parameters
-        ]
+        parameters = [{f.name: getattr(p, f.name) for f in dataclasses.fields(p)} for p in self.space.parameters]
         head = {
             "format": _FORMAT,
             "parameters": parameters,
@@ -207,7 +205,9 @@ class FitResult:
                 head = json.loads(str(file["head"]))
                 arrays = {name: file[name] for name in _ARRAYS}
         except Exception as error:
-            raise InputError(f"{path} is not a readable fit result ({error}). Save it again by FitResult.save.") from error
+            raise InputError(
+                f"{path} is not a readable fit result ({error}). Save it again by FitResult.save."
+            ) from error
         if head.pop("format") != _FORMAT:
             raise InputError(f"{path} was written by another version of drivetwin. Fit again, or use that version.")
         parameters = []

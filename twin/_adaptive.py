@@ -9,11 +9,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Bool, Float, PyTree
+from jaxtyping import Array, Float, Int, PyTree
 
 from twin.plant import AbstractPlant
 from twin.references import AbstractReference
 from twin.stepping import AdaptiveSteps
+
+# How an integration ended. Only a state that is no longer finite drives the step to its smallest length.
+COMPLETE, OUT_OF_STEPS, DIVERGED = 0, 1, 2
 
 
 def solve_adaptive(
@@ -22,8 +25,8 @@ def solve_adaptive(
     state: PyTree[Array],
     times: Float[Array, "times"],
     stepping: AdaptiveSteps,
-) -> tuple[PyTree[Array], Bool[Array, ""]]:
-    """States at the times, and whether the integrator gave up before the end."""
+) -> tuple[PyTree[Array], Int[Array, ""]]:
+    """States at the times, and how the integration ended: COMPLETE, OUT_OF_STEPS or DIVERGED."""
     if stepping.gradient == "reverse":
         return _integrate(_field(plant, reference), state, times, reference, stepping)
 
@@ -35,16 +38,16 @@ def solve_adaptive(
         return eqx.combine(arrays, fixed)
 
     @jax.custom_jvp
-    def solve(arrays: PyTree[Array], settings: PyTree[Array]) -> tuple[PyTree[Array], Bool[Array, ""]]:
+    def solve(arrays: PyTree[Array], settings: PyTree[Array]) -> tuple[PyTree[Array], Int[Array, ""]]:
         plant, reference, state = rebuild(arrays)
         times, stepping = eqx.combine(settings, options)
         return _integrate(_field(plant, reference), state, times, reference, stepping)
 
     def with_directions(
         arrays: PyTree[Array], directions: PyTree[Array], axes: PyTree[int | None], settings: PyTree[Array]
-    ) -> tuple[PyTree[Array], Bool[Array, ""], PyTree[Array]]:
+    ) -> tuple[PyTree[Array], Int[Array, ""], PyTree[Array]]:
         """State and its derivative along several directions at once; `axes` says which leaves differ between them."""
-        plant, reference, state = rebuild(arrays)
+        _, reference, state = rebuild(arrays)
         times, stepping = eqx.combine(settings, options)
         # A direction stands for about 100 % of its parameters, so that state and sensitivity share one tolerance.
         size = jax.vmap(lambda d: _relative_size(arrays, d), in_axes=(axes,))(directions)
@@ -67,18 +70,18 @@ def solve_adaptive(
             return jax.tree.map(lambda d: d / scale, d_state)
 
         sensitivity = jax.vmap(at_start, in_axes=(axes, 0))(directions, size)
-        (states, sensitivities), gave_up = _integrate(augmented, (state, sensitivity), times, reference, stepping)
+        (states, sensitivities), ending = _integrate(augmented, (state, sensitivity), times, reference, stepping)
         # Saved times lead; directions go first, as vmap wants them.
         unscaled = jax.tree.map(lambda s: jnp.moveaxis(s, 1, 0) * _fit(size, s.ndim), sensitivities)
-        return states, gave_up, unscaled
+        return states, ending, unscaled
 
     @jax.custom_batching.custom_vmap
     def along_one(
         arrays: PyTree[Array], direction: PyTree[Array], settings: PyTree[Array]
-    ) -> tuple[PyTree[Array], Bool[Array, ""], PyTree[Array]]:
+    ) -> tuple[PyTree[Array], Int[Array, ""], PyTree[Array]]:
         directions = jax.tree.map(lambda d: d[None], direction)
-        states, gave_up, tangents = with_directions(arrays, directions, jax.tree.map(lambda _: 0, directions), settings)
-        return states, gave_up, jax.tree.map(lambda s: s[0], tangents)
+        states, ending, tangents = with_directions(arrays, directions, jax.tree.map(lambda _: 0, directions), settings)
+        return states, ending, jax.tree.map(lambda s: s[0], tangents)
 
     @along_one.def_vmap
     def along_many(size: int, batched: Any, arrays: Any, direction: Any, settings: Any) -> Any:
@@ -88,16 +91,16 @@ def solve_adaptive(
         if any(jax.tree.leaves((batched[0], batched[2]))):
             out = jax.vmap(along_one.fun, in_axes=in_axes, axis_size=size)(arrays, direction, settings)
             return out, jax.tree.map(lambda _: True, out)
-        states, gave_up, tangents = with_directions(arrays, direction, in_axes[1], settings)
-        out = (states, gave_up, tangents)
+        states, ending, tangents = with_directions(arrays, direction, in_axes[1], settings)
+        out = (states, ending, tangents)
         flags = (jax.tree.map(lambda _: False, states), False, jax.tree.map(lambda _: True, tangents))
         return out, flags
 
     @solve.defjvp
     def solve_jvp(primals: Any, tangents: Any) -> Any:
         arrays, settings = primals
-        states, gave_up, derivative = along_one(arrays, tangents[0], settings)
-        return (states, gave_up), (derivative, _no_tangent(gave_up))
+        states, ending, derivative = along_one(arrays, tangents[0], settings)
+        return (states, ending), (derivative, _no_tangent(ending))
 
     return solve(varied, settings)
 
@@ -108,7 +111,7 @@ def _field(plant: AbstractPlant, reference: AbstractReference) -> Callable:
 
 def _integrate(
     field: Callable, state: PyTree[Array], times: Array, reference: AbstractReference, stepping: AdaptiveSteps
-) -> tuple[PyTree[Array], Bool[Array, ""]]:
+) -> tuple[PyTree[Array], Int[Array, ""]]:
     controller = diffrax.PIDController(
         rtol=stepping.rtol, atol=stepping.atol, norm=optx.max_norm, dtmin=stepping.min_step, force_dtmin=False
     )
@@ -120,7 +123,7 @@ def _integrate(
     # The integrator sees the leaves alone: empty tuples in a state (a law without memory) trip its buffers.
     leaves, structure = jax.tree.flatten(state)
 
-    def rates(t: Array, y: list[Array], args: Any) -> list[Array]:
+    def rates(t: Any, y: Any, args: Any) -> Any:
         del args
         return jax.tree.leaves(field(t, jax.tree.unflatten(structure, y)))
 
@@ -137,7 +140,9 @@ def _integrate(
         throw=False,
         adjoint=diffrax.RecursiveCheckpointAdjoint() if reverse else diffrax.ForwardMode(),
     )
-    return jax.tree.unflatten(structure, solution.ys), solution.result != diffrax.RESULTS.successful
+    failed = jnp.where(solution.result == diffrax.RESULTS.dt_min_reached, DIVERGED, OUT_OF_STEPS)
+    ending = jnp.where(solution.result == diffrax.RESULTS.successful, COMPLETE, failed)
+    return jax.tree.unflatten(structure, jax.tree.leaves(solution.ys)), ending
 
 
 def _relative_size(arrays: PyTree[Array], direction: PyTree[Array]) -> Float[Array, ""]:

@@ -1,5 +1,7 @@
 """Checks of input at the edge: one clear error that names the thing, the value seen, what was expected and the cure."""
 
+from typing import Any
+
 import jax
 import jax.core
 import jax.numpy as jnp
@@ -29,7 +31,7 @@ def is_concrete(value: object) -> bool:
     return not isinstance(value, jax.core.Tracer)
 
 
-def as_scalar(value: ArrayLike) -> Float[Array, ""]:
+def as_scalar(value: Any) -> Float[Array, ""]:
     """A number as a double-precision scalar array; the converter of every scalar parameter field."""
     require_x64()
     if not isinstance(value, jax.Array | np.ndarray | np.generic | float | int):
@@ -37,7 +39,7 @@ def as_scalar(value: ArrayLike) -> Float[Array, ""]:
     return jnp.asarray(value, dtype=jnp.float64)
 
 
-def as_array(value: ArrayLike) -> Float[Array, "..."]:
+def as_array(value: Any) -> Float[Array, "..."]:
     """Numbers as a double-precision array; the converter of every array parameter field."""
     require_x64()
     if not isinstance(value, jax.Array | np.ndarray | np.generic | float | int | list | tuple):
@@ -94,7 +96,7 @@ def increasing(name: str, value: ArrayLike, unit: str = "") -> None:
         index = int(np.flatnonzero(steps <= 0)[0])
         raise InputError(
             f"{name} must increase strictly, but does not at index {index + 1} "
-            f"({np.asarray(value)[index]:g} is followed by {np.asarray(value)[index + 1]:g}{' ' + unit if unit else ''}). "
+            f"({np.asarray(value)[index]:g} is followed by {np.asarray(value)[index + 1]:g}{_of(unit)}). "
             "Sort the samples and drop repeated ones."
         )
 

@@ -194,4 +194,3 @@ def _refuse_log(parameter: Parameter) -> None:
         f"{parameter.path}: the lower bound {parameter.lower:g} is negative, but the scale is log. "
         "Use a lower bound of at least zero, or the linear scale."
     )
-

@@ -53,7 +53,11 @@ def set_leaves(model: Model, values: dict[str, Any]) -> Model:
         old = _walk(model, holder)
         new = old
         for index, value in changes:
-            new = jnp.asarray(value, dtype=jnp.asarray(old).dtype) if index is None else jnp.asarray(new).at[index].set(value)
+            new = (
+                jnp.asarray(value, dtype=jnp.asarray(old).dtype)
+                if index is None
+                else jnp.asarray(new).at[index].set(value)
+            )
         replacements.append(new)
     return eqx.tree_at(lambda m: [_walk(m, h) for h in holders], model, replacements)
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float, PyTree
 
-from twin._adaptive import solve_adaptive
+from twin._adaptive import DIVERGED, OUT_OF_STEPS, solve_adaptive
 from twin._checks import InputError, increasing, is_concrete, require_x64
 from twin._constant import run_sampled_loop, solve_constant
 from twin.control.closed_loop import SampledLoop
@@ -40,8 +40,8 @@ def simulate(
             loops, whose right-hand side jumps at every tick).
 
     Returns:
-        The trajectory. A run that failed is marked by its status and holds NaN; one that is less accurate than asked for
-        is marked and kept.
+        The trajectory. A run that failed is marked by its status and holds NaN; one that is less accurate than asked
+        for is marked and kept.
 
     Raises:
         InputError: 64-bit mode off, times not increasing or fewer than two, ticks that do not fit the period.
@@ -67,9 +67,12 @@ def simulate(
         states, estimate = solve_constant(system, reference, state, times, stepping)
         status = _judge(estimate)
     elif isinstance(stepping, AdaptiveSteps):
-        states, gave_up = solve_adaptive(system, reference, state, times, stepping)
+        states, ending = solve_adaptive(system, reference, state, times, stepping)
         estimate = jnp.asarray(jnp.nan)
-        status = SimulationStatus.where(gave_up, SimulationStatus.too_many_steps, SimulationStatus.successful)
+        status = SimulationStatus.where(
+            ending == OUT_OF_STEPS, SimulationStatus.too_many_steps, SimulationStatus.successful
+        )
+        status = SimulationStatus.where(ending == DIVERGED, SimulationStatus.not_finite, status)
     else:
         raise InputError(f"stepping must be AdaptiveSteps or ConstantSteps, but is {type(stepping).__name__}.")
     inputs = jax.vmap(reference)(times)
@@ -111,11 +114,11 @@ def choose_substeps(
         coarse, substeps = fine, 2 * substeps
     raise InputError(
         f"{most} substeps are not enough for rtol {rtol:g} and atol {atol:g}, or the simulation is unstable. "
-        "Loosen the tolerance, widen the smoothing of friction, or use AdaptiveSteps where there is no sampled controller."
+        "Loosen the tolerance, widen the smoothing of friction, or use AdaptiveSteps if nothing is sampled."
     )
 
 
-def _states(system: Any, reference: AbstractReference, times: Array, substeps: int) -> list[Array]:
+def _states(system: Any, reference: AbstractReference, times: ArrayLike, substeps: int) -> list[Array]:
     stepping = ConstantSteps(substeps=substeps, rtol=float("inf"))
     return jax.tree.leaves(_compiled(system, reference, jnp.asarray(times), stepping).states)
 

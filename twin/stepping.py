@@ -12,6 +12,9 @@ from jaxtyping import Array, ArrayLike, Float, PyTree
 
 from twin._checks import InputError, as_scalar, positive
 
+# Steps written out one after the other: more gain little and take minutes to compile.
+_WRITTEN_OUT = 8
+
 
 class AbstractStepping(eqx.Module):
     """A way of stepping a plant through time."""
@@ -57,8 +60,8 @@ class AdaptiveSteps(AbstractStepping):
     min_step: float = eqx.field(static=True, default=1e-12)
     """Step length [s] below which the run is given up: one diverging lane must not stall its batch."""
     gradient: str = eqx.field(static=True, default="forward")
-    """"forward": forward sensitivities, as accurate as the tolerance. "reverse": `jax.grad` through the steps taken, for
-    many parameters; its accuracy is not controlled and lags the values' by some digits."""
+    """"forward": forward sensitivities, as accurate as the tolerance. "reverse": `jax.grad` through the steps taken,
+    for many parameters; its accuracy is not controlled and lags the values' by some digits."""
 
     def __check_init__(self):
         positive("rtol", self.rtol)
@@ -87,14 +90,14 @@ def runge_kutta_steps(
         start: time at the start [s].
         length: length of all steps together [s].
         state: state at the start.
-        unrolled: write out the steps too, which is fast for one simulation; else loop over them, which compiles fast
-            and costs nothing in a batch.
+        unrolled: write out the steps too, up to 8, which is fast for one simulation; else loop over them, which
+            compiles fast and costs nothing in a batch.
 
     Returns:
         The state at the end, and the sum of the magnitudes of the embedded estimates of the local errors, in the same
         structure, not differentiated.
     """
-    tableau = stepping.solver.tableau
+    tableau: Any = stepping.solver.tableau
     step = length / stepping.substeps
 
     def one(carry: Any, i: Any) -> tuple[Any, None]:
@@ -109,11 +112,11 @@ def runge_kutta_steps(
         return (state, stages[-1] if tableau.fsal else vector_field(t + step, state), total), None
 
     carry = (state, vector_field(start, state), jax.tree.map(jnp.zeros_like, state))
-    if unrolled:
+    if unrolled and stepping.substeps <= _WRITTEN_OUT:
         for i in range(stepping.substeps):
             carry, _ = one(carry, i)
     else:
-        carry, _ = jax.lax.scan(one, carry, jnp.arange(stepping.substeps))
+        carry, _ = jax.lax.scan(one, carry, jnp.arange(stepping.substeps), unroll=_WRITTEN_OUT if unrolled else 1)
     return carry[0], carry[2]
 
 

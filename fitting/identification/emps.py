@@ -197,7 +197,9 @@ def _climb(train: EmpsRecord) -> tuple[Tried, ...]:
                 (command - np.asarray(record.channel("voltage"))) / deviation["command"],
             ]
         )
-        tried.append(Tried(rung, fit, np.mean(rows[:, : 3 * CYCLE] ** 2), np.mean(rows[:, 3 * CYCLE :] ** 2)))
+        tried.append(
+            Tried(rung, fit, float(np.mean(rows[:, : 3 * CYCLE] ** 2)), float(np.mean(rows[:, 3 * CYCLE :] ** 2)))
+        )
     return tuple(tried)
 
 

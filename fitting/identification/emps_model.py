@@ -1,6 +1,6 @@
 """The EMPS axis as a twin: its structure, what is known from the record, and the ladder of models tried on it."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -95,8 +95,8 @@ def emps_ladder() -> tuple[Rung, ...]:
 def emps_start(data: EmpsRecord) -> SampledLoop:
     """The axis before any fit: round numbers, terms beyond viscous and Coulomb friction switched off.
 
-    What is taken from the record itself: first position, speed, the encoder memory of the controller and the amplifier's
-    output at the first tick, all by solving the known control law for them at the first two ticks.
+    What is taken from the record itself: first position, speed, the encoder memory of the controller and the
+    amplifier's output at the first tick, all by solving the known control law for them at the first two ticks.
 
     Args:
         data: EMPS record with its controller's gains.
@@ -150,20 +150,12 @@ def on_record(model: SampledLoop, data: EmpsRecord) -> SampledLoop:
         model: fitted axis.
         data: the record to simulate.
     """
-    fresh = emps_start(data)
-    axis = fresh.plant.plant
-    return eqx.tree_at(
-        lambda m: (
-            m.plant.plant.initial_position,
-            m.plant.plant.initial_velocity,
-            m.plant.initial_command,
-            m.controller,
-            m.injection,
-        ),
-        model,
-        (axis.initial_position, axis.initial_velocity, fresh.plant.initial_command, fresh.controller, fresh.injection),
-        is_leaf=lambda x: x is None,
-    )
+
+    def of_the_record(m: Any) -> tuple:
+        axis = m.plant.plant
+        return axis.initial_position, axis.initial_velocity, m.plant.initial_command, m.controller, m.injection
+
+    return eqx.tree_at(of_the_record, model, of_the_record(emps_start(data)), is_leaf=lambda x: x is None)
 
 
 def with_screw_phase(model: SampledLoop, origin: float | np.ndarray) -> SampledLoop:

@@ -109,7 +109,9 @@ def _repeatability(study: EmpsStudy) -> float:
 def _text(study: EmpsStudy, summary: dict[str, Any]) -> str:
     lines = ["Inverse dynamics"]
     for name, fit in study.inverse.items():
-        lines += [f"  {name}"] + [f"    {p:28} {e.value:10.4f} ± {e.standard_error:.4f} {e.unit}" for p, e in fit.estimates().items()]
+        lines += [f"  {name}"] + [
+            f"    {p:28} {e.value:10.4f} ± {e.standard_error:.4f} {e.unit}" for p, e in fit.estimates().items()
+        ]
     lines += ["Output error: models tried, force / velocity error in %"]
     lines += [f"  {'k':>2} {'train':>15} {'test':>15} {'cycle 4':>8} {'BIC':>8}  model"]
     for i, row in enumerate(summary["models_tried"]):
@@ -123,9 +125,7 @@ def _text(study: EmpsStudy, summary: dict[str, Any]) -> str:
         f"Chosen (*) by cycle 4, refitted on the whole training record: train {_pair(best['train'])}, "
         f"test {_pair(best['test'])} (without the encoder zero {_pair(best['test_without_encoder_zero'])})",
         "Published, symmetric: train 5.85 / 0.229, test 8.94 / 0.479",
-        study.fit.to_dataframe()[["unit", "estimate", "standard error", "remark"]].to_string(
-            float_format=lambda x: f"{x:.5g}"
-        ),
+        study.fit.to_dataframe()[["unit", "estimate", "standard error", "remark"]].round(9).to_string(),
         study.fit.message,
     ]
     return "\n".join(lines)
@@ -151,7 +151,7 @@ def _draw(study: EmpsStudy, out: Path) -> None:
         axes[1].set_ylabel("measured - simulated [N]")
         errors: Score = score(model, data)
         axes[0].set_title(
-            f"EMPS {name} record: force error {errors.force_percent:.2f} %, velocity error {errors.velocity_percent:.3f} %"
+            f"EMPS {name} record: force error {errors.force_percent:.2f} %, velocity {errors.velocity_percent:.3f} %"
         )
         save_figure(figure, out / f"{name}.png")
     _draw_residuals(study, out)

@@ -42,11 +42,13 @@ class DerivativeFilter:
         """
         nyquist = 0.5 / period
         if not 0 < self.cutoff < nyquist:
-            raise InputError(f"The cutoff of {self.cutoff:g} Hz must lie between 0 and the Nyquist frequency {nyquist:g} Hz.")
-        taps = signal.butter(self.order, self.cutoff / nyquist)
+            raise InputError(
+                f"The cutoff of {self.cutoff:g} Hz must lie between 0 and the Nyquist frequency {nyquist:g} Hz."
+            )
+        sections = signal.butter(self.order, self.cutoff / nyquist, output="sos")
         if position.size <= 3 * (self.order + 1):
             raise InputError(f"A record of {position.size} samples is too short for a filter of order {self.order}.")
-        smooth = signal.filtfilt(*taps, position)
+        smooth = signal.sosfiltfilt(sections, position)
         velocity = np.gradient(smooth, period)
         return smooth, velocity, np.gradient(velocity, period)
 
@@ -91,7 +93,8 @@ def inverse_dynamics(
             "left out at each end. Use a longer record, or decimate less."
         )
     period = float(record.sample_period)
-    motion = tuple(jnp.asarray(x) for x in (derivatives or DerivativeFilter())(position, period))
+    smooth, velocity, acceleration = (derivatives or DerivativeFilter())(position, period)
+    motion = (jnp.asarray(smooth), jnp.asarray(velocity), jnp.asarray(acceleration))
     force = np.asarray(record.channel("force"))
 
     start = space.values(axis)

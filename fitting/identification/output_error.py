@@ -1,4 +1,4 @@
-"""Output error: parameters that make a closed-loop simulation follow the record, by gradients through the simulation."""
+"""Output error: parameters that make a closed-loop simulation follow the record, by gradients through it."""
 
 import dataclasses
 from collections.abc import Iterable, Mapping

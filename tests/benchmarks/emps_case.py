@@ -27,7 +27,7 @@ COMMAND_LIMIT = 10.0
 _GAIN = 35.15
 _DAHL_WIDTH = 1e-5
 _RISE_VELOCITY = 0.01
-_SPEED_LIMIT = 0.01
+_RATE_LIMIT = 500.0
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def dahl_case() -> Case:
         asymmetry=10.0,
         rise=4.0,
         rise_velocity=_RISE_VELOCITY,
-        speed_limit=_SPEED_LIMIT,
+        rate_limit=_RATE_LIMIT,
         width=_DAHL_WIDTH,
     )
     axis = ServoAxis(mass=95.1, friction=friction, gain=_GAIN, offset=-3.17, initial_position=wanted[0])
@@ -121,7 +121,7 @@ def _dahl_rate(state: Sequence[Any], command: Any, values: Sequence[Any], functi
     speed = functions.sqrt(v * v + _DAHL_WIDTH**2)
     level = coulomb - rise * functions.expm1(-speed / _RISE_VELOCITY) + viscous * speed
     friction = z * level + z * z * asymmetry * speed
-    limited = v / functions.sqrt(1 + v * v / _SPEED_LIMIT**2)
+    limited = v / functions.sqrt(1 + (v / (_RATE_LIMIT * displacement)) ** 2)
     turning = (limited - functions.sqrt(limited * limited + _DAHL_WIDTH**2) * z) / displacement
     return [v, (_GAIN * actual - friction - offset) / mass, turning, (command - actual) / lag]
 

@@ -52,7 +52,9 @@ def test_writes_only_what_is_named(path):
 
 
 def test_writes_several_at_once_also_into_one_vector():
-    changed = set_leaves(AXIS, {"position_force.coefficients.1": -1.0, "mass": 3.0, "position_force.coefficients.0": -2.0})
+    changed = set_leaves(
+        AXIS, {"position_force.coefficients.1": -1.0, "mass": 3.0, "position_force.coefficients.0": -2.0}
+    )
     np.testing.assert_array_equal(changed.position_force.coefficients, [-2.0, -1.0])
     assert float(changed.mass) == 3.0
 

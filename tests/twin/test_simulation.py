@@ -18,7 +18,13 @@ from twin.simulation import SimulationStatus, choose_substeps, simulate
 from twin.stepping import AdaptiveSteps, ConstantSteps
 
 REST = ConstantInputs(0.0, 0.0)
-run = eqx.filter_jit(simulate)
+
+
+@eqx.filter_jit
+def run(system, reference, times, *, stepping=None, initial_state=None):
+    return simulate(system, reference, times, stepping=stepping, initial_state=initial_state)
+
+
 TIGHT = AdaptiveSteps(rtol=1e-10, atol=1e-13)
 
 
@@ -45,8 +51,8 @@ def test_a_coasting_axis(stepping):
     times = np.linspace(0.0, 1.5, 31)
     trajectory = run(axis, REST, times, stepping=stepping)
     assert _ends(trajectory) == "successful"
-    np.testing.assert_allclose(trajectory.states.velocity, 2 * np.exp(-2 * times), rtol=3e-9)
-    np.testing.assert_allclose(trajectory.channel("position"), 0.1 + 1 - np.exp(-2 * times), rtol=3e-9)
+    np.testing.assert_allclose(trajectory.states.velocity, 2 * np.exp(-2 * times), rtol=2e-8)
+    np.testing.assert_allclose(trajectory.channel("position"), 0.1 + 1 - np.exp(-2 * times), rtol=2e-8)
     assert np.isnan(trajectory.error_estimate) == isinstance(stepping, AdaptiveSteps)
 
 
@@ -66,7 +72,9 @@ def test_two_masses_against_the_matrix_exponential(stepping):
     times = np.linspace(0.0, 0.4, 41)
     trajectory = run(drive, ConstantInputs(3.0, -0.5), times, stepping=stepping)
     exact = _two_mass_exact(drive, times, 3.0, -0.5, np.zeros(4))
-    np.testing.assert_allclose(_columns(trajectory) / np.max(np.abs(exact), axis=0), exact / np.max(np.abs(exact), axis=0), atol=1e-7)
+    np.testing.assert_allclose(
+        _columns(trajectory) / np.max(np.abs(exact), axis=0), exact / np.max(np.abs(exact), axis=0), atol=1e-7
+    )
     twist = exact[:, 0] - exact[:, 1]
     shaft = 40.0 * twist + 0.02 * (exact[:, 2] - exact[:, 3])
     np.testing.assert_allclose(trajectory.channel("shaft"), shaft, atol=1e-7 * np.max(np.abs(shaft)))
@@ -100,42 +108,63 @@ def test_a_sampled_loop_against_its_exact_discretisation():
     np.testing.assert_allclose(trajectory.channel("force"), 35 * commands, atol=3e-8)
 
 
-@pytest.mark.parametrize(("solver", "order", "points"), [(diffrax.Bosh3(), 3, 160), (diffrax.Tsit5(), 5, 40)])
+@pytest.mark.parametrize(("solver", "order", "points"), [(diffrax.Bosh3(), 3, 160), (diffrax.Tsit5(), 5, 120)])
 def test_rate_of_convergence(solver, order, points):
     drive, start = two_mass(), np.array([0.1, 0.0, 0.0, 1.0])
-    errors, estimates = [], []
+    state = drive.initial_state()._replace(motor_position=jnp.asarray(0.1), load_velocity=jnp.asarray(1.0))
+    times = np.linspace(0.0, 0.2, points + 1)
+    exact = _two_mass_exact(drive, times, 0.0, 0.0, start)
+    propagation = expm(np.asarray(two_mass_matrices(drive)[0]) * times[1])
+    largest = np.max(np.abs(exact), axis=0)
+    errors, local, estimates = [], [], []
     for substeps in (1, 2, 4):
-        times = np.linspace(0.0, 0.2, points + 1)
-        state = drive.initial_state()._replace(motor_position=jnp.asarray(0.1), load_velocity=jnp.asarray(1.0))
-        stepping = ConstantSteps(substeps, rtol=1.0, atol=1e-12, solver=solver)
+        stepping = ConstantSteps(substeps, rtol=1.0, atol=1e-30, solver=solver)
         trajectory = run(drive, REST, times, initial_state=state, stepping=stepping)
-        exact = _two_mass_exact(drive, times, 0.0, 0.0, start)
-        largest = np.max(np.abs(exact), axis=0)
-        errors.append(np.max(np.abs(_columns(trajectory) - exact) / largest))
+        x = _columns(trajectory)
+        errors.append(np.max(np.abs(x - exact) / largest))
+        local.append(np.max(np.abs(x[1:] - x[:-1] @ propagation.T) / largest))
         estimates.append(float(trajectory.error_estimate))
-    np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), order, atol=0.15)
-    # The embedded method's local errors, one order higher than its global one, are summed over the steps.
-    np.testing.assert_allclose(np.log2(np.divide(estimates[:-1], estimates[1:])), order - 1, atol=0.15)
-    assert np.all(np.asarray(estimates) > errors)
+    np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), order, atol=0.2)
+    # The estimate is that of the embedded method, one order lower, over one span: it errs on the safe side.
+    np.testing.assert_allclose(np.log2(np.divide(estimates[:-1], estimates[1:])), order - 1, atol=0.2)
+    assert np.all(np.asarray(estimates) > local)
 
 
 @pytest.mark.parametrize("substeps", [1, 4])
-def test_the_error_estimate_bounds_the_error(substeps):
-    """Through two reversals of Coulomb friction, where the error is largest."""
+def test_the_error_estimate_bounds_the_local_error(substeps):
+    """Through two reversals of Coulomb friction, where the error is largest; each span started anew, and exactly."""
     axis = eqx.tree_at(lambda a: a.friction, viscous_axis(gain=35.0), CoulombViscousFriction(20.0, 200.0, 5e-3))
     sine, times = SineCommand(3.0, 2.0), np.linspace(0.0, 0.6, 301)
-    exact = _columns(run(axis, sine, times, stepping=TIGHT))
-    trajectory = run(axis, sine, times, stepping=ConstantSteps(substeps, rtol=1e-3, atol=1e-9))
-    error = np.max(np.abs(_columns(trajectory) - exact) / (1e-9 + 1e-3 * np.max(np.abs(exact), axis=0)))
-    assert _ends(trajectory) == "successful"
-    assert 0 < error < float(trajectory.error_estimate) < 1
+    exact = run(axis, sine, times, stepping=TIGHT).states
+    stepping = ConstantSteps(substeps, rtol=1e-3, atol=1e-9)
+    whole = run(axis, sine, times, stepping=stepping)
+    starts = jax.tree.map(lambda x: x[:-1], exact)
+    ends = _one_span(axis, sine, times, starts, stepping)
+    error = max(
+        float(jnp.max(jnp.abs(a - b[1:])) / (1e-9 + 1e-3 * jnp.max(jnp.abs(b))))
+        for a, b in zip(jax.tree.leaves(ends), jax.tree.leaves(exact), strict=True)
+    )
+    assert _ends(whole) == "successful"
+    assert 0 < error < float(whole.error_estimate) < 1
 
 
-def test_the_error_estimate_bounds_the_error_of_a_sampled_loop():
+@eqx.filter_jit
+def _one_span(system, reference, times, starts, stepping):
+    def one(start, begin, end):
+        span = jnp.stack([begin, end])
+        trajectory = simulate(system, reference, span, initial_state=start, stepping=stepping)
+        return jax.tree.map(lambda x: x[-1], trajectory.states)
+
+    return jax.vmap(one)(starts, times[:-1], times[1:])
+
+
+def test_the_error_estimate_bounds_the_local_error_of_a_sampled_loop():
     reference = SampledReference(TICKS, 0.05 * np.sin(12 * TICKS) ** 2)
     trajectory = run(LOOP, reference, TICKS, stepping=ConstantSteps(1, rtol=1e-6))
-    exact, _ = _sampled_loop_exactly(np.asarray(reference.position))
-    error = np.max(np.abs(_columns(trajectory) - exact) / (1e-9 + 1e-6 * np.max(np.abs(exact), axis=0)))
+    x, command = _columns(trajectory), np.asarray(trajectory.channel("command"))
+    force = (35 * command[:-1] - 4) / 100
+    after = x[:-1, 1] * np.exp(-4e-3) + force * (1 - np.exp(-4e-3)) / 2
+    error = np.max(np.abs(x[1:, 1] - after)) / (1e-9 + 1e-6 * np.max(np.abs(x[:, 1])))
     assert 0 < error < float(trajectory.error_estimate)
 
 
@@ -155,16 +184,24 @@ def _unstable():
         (_unstable(), AdaptiveSteps(max_steps=4096), "not_finite"),
         (eqx.tree_at(lambda a: a.mass, viscous_axis(), jnp.asarray(jnp.nan)), ConstantSteps(4), "not_finite"),
         (eqx.tree_at(lambda a: a.mass, viscous_axis(), jnp.asarray(jnp.nan)), AdaptiveSteps(), "not_finite"),
-        (eqx.tree_at(lambda a: a.friction.viscous, viscous_axis(initial_velocity=1.0), jnp.asarray(1e4)),
-         ConstantSteps(1, rtol=1e-6), "not_accurate"),
         (two_mass(), AdaptiveSteps(max_steps=16), "too_many_steps"),
     ],
-)  # fmt: skip
+)
 def test_trap_9_a_failed_run_is_marked_and_holds_no_number(system, stepping, end):
     trajectory = run(system, ConstantInputs(1.0, 0.0), np.linspace(0.0, 1.0, 101), stepping=stepping)
     assert _ends(trajectory) == end
     assert _all_nan(trajectory)
     assert "." in str(SimulationStatus[trajectory.status])
+
+
+def test_coarse_steps_are_marked_and_kept():
+    axis = eqx.tree_at(lambda a: a.friction.viscous, viscous_axis(initial_velocity=1.0), jnp.asarray(5e3))
+    times = np.linspace(0.0, 1.0, 101)
+    trajectory = run(axis, REST, times, stepping=ConstantSteps(1, rtol=1e-6))
+    assert _ends(trajectory) == "not_accurate"
+    assert float(trajectory.error_estimate) > 1
+    error = np.max(np.abs(trajectory.states.velocity - np.exp(-50 * times)))
+    assert 1e-6 < error < 0.01
 
 
 def test_a_sampled_loop_with_the_wrong_sign_is_marked():
@@ -233,25 +270,39 @@ def test_trap_8_a_bad_lane_does_not_stall_its_batch():
 
 
 def test_choose_substeps_takes_the_smallest_power_of_two():
-    move, loop = JerkLimitedMove(0.05, 0.5, 5.0, 100.0), eqx.tree_at(lambda loop: loop.plant.mass, LOOP, jnp.asarray(1.0))
-    chosen = choose_substeps(loop, move, TICKS, rtol=1e-7)
+    """A light axis, whose speed settles within a few ticks, against its exact discretisation."""
+    move = JerkLimitedMove(0.05, 0.5, 5.0, 100.0)
+    loop = eqx.tree_at(lambda loop: loop.plant.mass, LOOP, jnp.asarray(10.0))
+    exact = _columns(run(loop, move, TICKS, stepping=ConstantSteps(8, solver=diffrax.Tsit5())))
+    chosen = choose_substeps(loop, move, TICKS, rtol=1e-6)
     assert chosen.substeps in (2, 4, 8)
-    assert (chosen.rtol, chosen.atol) == (1e-7, 1e-9)
-    assert _ends(run(loop, move, TICKS, stepping=chosen)) == "successful"
-    coarser = ConstantSteps(chosen.substeps // 2, rtol=1e-7, atol=1e-9)
-    assert _ends(run(loop, move, TICKS, stepping=coarser)) == "not_accurate"
+    errors = [
+        np.max(
+            np.abs(_columns(run(loop, move, TICKS, stepping=ConstantSteps(n))) - exact) / np.max(np.abs(exact), axis=0)
+        )
+        for n in (chosen.substeps, chosen.substeps // 2)
+    ]
+    assert errors[0] < 1.2e-6 < 3 * errors[1]
 
 
-def test_choose_substeps_gives_up():
+@pytest.mark.parametrize("system", [LOOP, eqx.tree_at(lambda loop: loop.plant.gain, LOOP, jnp.asarray(-35e3))])
+def test_choose_substeps_gives_up(system):
     with pytest.raises(InputError, match="2 substeps are not enough for rtol 1e-13"):
-        choose_substeps(LOOP, JerkLimitedMove(0.05, 0.5, 5.0, 100.0), TICKS, rtol=1e-13, atol=0.0, most=2)
+        choose_substeps(system, JerkLimitedMove(0.05, 0.5, 5.0, 100.0), TICKS, rtol=1e-13, atol=1e-30, most=2)
+
+
+@pytest.mark.parametrize("substeps", [8, 9, 16])
+def test_written_out_steps_and_looped_steps_are_the_same(substeps):
+    axis, times = viscous_axis(initial_velocity=2.0), np.linspace(0.0, 1.5, 4)
+    trajectory = run(axis, REST, times, stepping=ConstantSteps(substeps))
+    growth = 1 - 2 * (h := 0.5 / substeps) + 2 * h**2 - 4 / 3 * h**3
+    np.testing.assert_allclose(trajectory.states.velocity, 2 * growth ** (substeps * np.arange(4)), rtol=1e-13)
 
 
 @pytest.mark.parametrize(
     ("change", "said"),
     [
         ({"times": np.zeros(1)}, "at least two times"),
-        ({"times": np.zeros((2, 2))}, r"shape \(2, 2\)"),
         ({"times": np.array([0.0, 2e-3, 1e-3])}, "increase"),
         ({"times": np.array([0.0, np.nan, 1.0])}, "finite"),
         ({"stepping": AdaptiveSteps()}, "simulated with ConstantSteps"),

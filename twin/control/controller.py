@@ -15,7 +15,9 @@ class AbstractController(eqx.Module):
         """State of the controller at the start (integrators, filters)."""
 
     @abc.abstractmethod
-    def vector_field(self, t: Float[Array, ""], state: PyTree[Array], reference: Any, measurement: Any) -> PyTree[Array]:
+    def vector_field(
+        self, t: Float[Array, ""], state: PyTree[Array], reference: Any, measurement: Any
+    ) -> PyTree[Array]:
         """Time derivative of the controller's state."""
 
     @abc.abstractmethod
@@ -28,7 +30,7 @@ class AbstractSampledController(eqx.Module):
 
     @abc.abstractmethod
     def initial_state(self, measurement: Any, period: Float[Array, ""]) -> PyTree[Array]:
-        """Memory of the controller before its first tick, given what it measures there and the time between ticks [s]."""
+        """Memory before the first tick, given what the controller measures there and the time between ticks [s]."""
 
     @abc.abstractmethod
     def update(

@@ -1,4 +1,4 @@
-"""A sampled position controller with an inner velocity controller, both proportional, as drives of many machines have."""
+"""A sampled position controller with an inner velocity controller, both proportional."""
 
 from typing import Any, NamedTuple
 
@@ -33,7 +33,7 @@ class SampledPositionVelocity(AbstractSampledController):
     command_limit: Float[Array, ""] = eqx.field(converter=as_scalar, default=float("inf"))
     """Largest magnitude of the command [command unit]."""
     history: EncoderMemory | None = None
-    """Encoder positions at the two ticks before the start, where a record tells them; else a steady motion is assumed."""
+    """Encoder positions at the two ticks before the start, where a record tells them; else steady motion is assumed."""
 
     def __check_init__(self):
         not_negative("position_gain", self.position_gain, "1/s")

@@ -24,8 +24,8 @@ class DahlFriction(AbstractFriction):
     """F = z·(F_c + F_1·(1 - exp(-|v|/v_1)) + F_v·|v| + ΔF(x)) + z²·F_a·|v|,  dz/dt = (u - |u|·z)/δ.
 
     z follows the direction of motion over the displacement δ: balls of a screw or guide roll a few micrometres before
-    they slide. It takes the place of sgn(v), so that friction has hysteresis instead of a jump. The sliding level starts
-    at F_c and rises by F_1 over the speed v_1, as lubricant is drawn in and sheared; the viscous coefficient is
+    they slide. It takes the place of sgn(v), so that friction has hysteresis instead of a jump. The sliding level
+    starts at F_c and rises by F_1 over the speed v_1, as lubricant is drawn in and sheared; the viscous coefficient is
     F_v + F_a in positive and F_v - F_a in negative direction. ΔF(x) is a change of the sliding level along the travel.
 
     u = v/√(1 + (v/ρδ)²) is the speed, limited to ρ·δ: above it z has long arrived, and the limit keeps z from moving
@@ -93,4 +93,8 @@ class DahlFriction(AbstractFriction):
         Args:
             speed: magnitude of the speed, any shape [m/s or rad/s].
         """
-        return self.coulomb - self.rise * jnp.expm1(-speed / self.rise_velocity) + self.viscous * jnp.asarray(speed)
+        return (
+            self.coulomb
+            - self.rise * jnp.expm1(-jnp.asarray(speed) / self.rise_velocity)
+            + self.viscous * jnp.asarray(speed)
+        )

@@ -46,7 +46,9 @@ class ConstantForce(AbstractPositionForce):
 
 
 class HarmonicForce(AbstractPositionForce):
-    """F = Σ a_n·cos(2πn·(x - x_0)/p) + b_n·sin(2πn·(x - x_0)/p), n = 1..harmonics: what repeats with every turn, tooth or pole pair.
+    """F = Σ a_n·cos(2πn·(x - x_0)/p) + b_n·sin(2πn·(x - x_0)/p), n = 1..harmonics.
+
+    What repeats with every turn, tooth or pole pair.
 
     Raises:
         InputError: if the period is not positive, the amplitudes are no vectors of equal length, or any is not finite.

@@ -43,9 +43,10 @@ def test_square_and_tall(rows):
 
 def test_trap_28_keeps_the_digits_that_normal_equations_lose():
     random = np.random.default_rng(0)
-    left, right = np.linalg.qr(random.standard_normal((ROWS, COLUMNS)))[0], np.linalg.qr(
-        random.standard_normal((COLUMNS, COLUMNS))
-    )[0]
+    left, right = (
+        np.linalg.qr(random.standard_normal((ROWS, COLUMNS)))[0],
+        np.linalg.qr(random.standard_normal((COLUMNS, COLUMNS)))[0],
+    )
     matrix = left * np.logspace(0, -5, COLUMNS) @ right
     solution = random.standard_normal(COLUMNS)
     np.testing.assert_allclose(_solve(matrix, matrix @ solution), solution, rtol=0, atol=1e-10)

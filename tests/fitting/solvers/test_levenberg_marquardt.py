@@ -90,7 +90,9 @@ def test_same_minimum_as_scipy(name):
     active = np.asarray(solution.state.active)
     if lower is not None:
         assert np.all((np.asarray(lower) <= solution.value) & (solution.value <= np.asarray(upper)))
-        np.testing.assert_array_equal(active, (solution.value == np.asarray(lower)) | (solution.value == np.asarray(upper)))
+        np.testing.assert_array_equal(
+            active, (solution.value == np.asarray(lower)) | (solution.value == np.asarray(upper))
+        )
     assert active.any() == (name in HELD)
 
 
@@ -159,7 +161,9 @@ def test_more_unknowns_than_residuals():
     assert float(solution.value[0] * solution.value[1]) == pytest.approx(2.0, rel=1e-9)
 
 
-@pytest.mark.parametrize("spoil", [lambda r, x: r / (x[0] + 1.2), lambda r, x: r + jnp.sqrt(x[0] + 1.2)], ids=["value", "slope"])
+@pytest.mark.parametrize(
+    "spoil", [lambda r, x: r / (x[0] + 1.2), lambda r, x: r + jnp.sqrt(x[0] + 1.2)], ids=["value", "slope"]
+)
 def test_a_start_that_is_not_finite(spoil):
     solution = _solve(lambda x, _: spoil(_rosenbrock(x), x), [-1.2, 1.0])
     assert _reason(solution) == str(Stop[Stop.not_finite])

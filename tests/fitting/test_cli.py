@@ -1,0 +1,53 @@
+"""The command line: the demo from end to end, and one clear line for input that cannot be used."""
+
+import json
+
+import pytest
+
+from fitting.cli import main
+from fitting.result import FitResult
+from twin.io.parameter_file import read_parameters
+
+
+@pytest.mark.slow
+def test_demo_recovers_its_parameters(tmp_path, capsys):
+    from fitting.demo import demo_axis
+
+    assert main(["demo", "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    for path, row in summary["parameters"].items():
+        assert path in printed
+        assert abs(row["value"] - row["true"]) < 4 * row["standard_error"]
+    entries = read_parameters(tmp_path / "parameters.toml")
+    assert [e.path for e in entries] == list(summary["parameters"])
+    assert {f.name for f in tmp_path.glob("*.png")} == {"record_and_fit.png", "intervals.png"}
+    assert demo_axis().plant.mass == summary["parameters"]["plant.mass"]["true"]
+
+
+def test_missing_data_is_one_clear_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("DRIVETWIN_DATA", str(tmp_path / "nowhere"))
+    assert main(["reproduce", "emps", "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("drivetwin: ")
+    assert "DRIVETWIN_DATA" in error
+
+
+def test_out_that_is_a_file_is_refused(tmp_path, capsys):
+    blocker = tmp_path / "file"
+    blocker.write_text("")
+    assert main(["demo", "--out", str(blocker)]) == 2
+    assert str(blocker) in capsys.readouterr().err
+
+
+def test_unknown_command_ends_with_usage():
+    with pytest.raises(SystemExit) as stop:
+        main(["reproduce", "nothing"])
+    assert stop.value.code == 2
+
+
+def test_damaged_result_is_named(tmp_path):
+    broken = tmp_path / "fit.npz"
+    broken.write_bytes(b"PK\x03\x04 not an archive")
+    with pytest.raises(ValueError, match=r"fit\.npz is not a readable fit result"):
+        FitResult.load(broken, None)

@@ -31,7 +31,7 @@ class Estimate(NamedTuple):
     """Unit."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class FitResult:
     """A fitted model, with what is known about its parameters. Shows itself as a table in a notebook."""
 
@@ -227,7 +227,7 @@ class FitResult:
         )
         return f"<div><p><b>Fit</b>: {facts}.</p><p>{self.message}</p>{table}</div>"
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         table = self.to_dataframe().to_string(float_format=lambda x: f"{x:.6g}")
         return f"{table}\n{self.message}"
 

@@ -120,10 +120,10 @@ def run_emps_study(train: EmpsRecord | None = None, test: EmpsRecord | None = No
     test = read_emps(record="test") if test is None else test
     inverse = {
         "symmetric": inverse_dynamics(
-            train.record, ServoAxis(1.0, CoulombViscousFriction(1.0, 1.0, 1e-9)), _plain_space(SYMMETRIC)
+            train.record, ServoAxis(1.0, CoulombViscousFriction(1.0, 1.0, 1e-9)), plain_space(SYMMETRIC)
         ),
         "asymmetric": inverse_dynamics(
-            train.record, ServoAxis(1.0, AsymmetricFriction(1.0, 1.0, 1.0, 1.0, 1e-9)), _plain_space(ASYMMETRIC)
+            train.record, ServoAxis(1.0, AsymmetricFriction(1.0, 1.0, 1.0, 1.0, 1e-9)), plain_space(ASYMMETRIC)
         ),
     }
     clock.lap("inverse_dynamics")
@@ -249,7 +249,12 @@ def _motion(position: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return DerivativeFilter()(position, PERIOD)
 
 
-def _plain_space(paths: tuple[str, ...]) -> ParameterSpace:
+def plain_space(paths: tuple[str, ...]) -> ParameterSpace:
+    """Parameters of a plain servo axis without bounds, with their units.
+
+    Args:
+        paths: dotted paths, such as `SYMMETRIC`.
+    """
     units = {"mass": "kg", "viscous": "N s/m", "coulomb": "N", "offset": "N"}
     return ParameterSpace([Parameter(p, next(u for name, u in units.items() if name in p)) for p in paths])
 

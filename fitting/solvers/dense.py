@@ -67,6 +67,9 @@ def bounded_least_squares(
     # A multiplier is zero when it is rounding of the products that it is the sum of.
     rounding = 1e-14 * jnp.sqrt(jnp.diag(normal)) * jnp.sqrt(jnp.sum(target**2))
 
+    # Bounds that meet leave nothing to decide.
+    pinned = lower == upper
+
     def solve(x: Array, held: Array) -> Array:
         fixed = jnp.where(held, x, 0.0)
         kept = jnp.where(held, 0.0, 1.0)
@@ -90,7 +93,7 @@ def bounded_least_squares(
         gradient = normal @ x + gradient_at_zero
         pull = jnp.where(at_lower, -gradient, jnp.where(at_upper, gradient, -jnp.inf)) - rounding
         worst = jnp.arange(columns) == jnp.argmax(pull / jnp.sqrt(jnp.diag(normal)))
-        freed = ~blocked & worst & (pull > 0)
+        freed = ~blocked & worst & (pull > 0) & ~pinned
         at_lower = (at_lower | (hit & (step < 0))) & ~freed
         at_upper = (at_upper | (hit & (step > 0))) & ~freed
         return x, at_lower, at_upper, ~blocked & ~jnp.any(freed), count + 1
@@ -99,8 +102,8 @@ def bounded_least_squares(
         _, _, _, settled, count = carry
         return ~settled & (count < 10 * columns)
 
-    pushed_down = (lower == 0) & (gradient_at_zero > 0)
-    pushed_up = (upper == 0) & (gradient_at_zero < 0)
+    pushed_down = ((lower == 0) & (gradient_at_zero > 0)) | pinned
+    pushed_up = (upper == 0) & (gradient_at_zero < 0) & ~pinned
     start = (jnp.zeros(columns), pushed_down, pushed_up, jnp.asarray(False), jnp.asarray(0))
     x, at_lower, at_upper, _, _ = jax.lax.while_loop(unsettled, body, start)
     return x, at_lower | at_upper

@@ -38,7 +38,7 @@ class Row:
     simulation: Timing
     """The simulation."""
     jacobian: Timing | None
-    """The Jacobian; None where it was left out because a faster entrant stands for the same role."""
+    """The Jacobian; None where the entrant has none."""
     position_error: float
     """Largest difference from the exact positions [m]."""
     jacobian_error: float
@@ -91,7 +91,7 @@ def compare(case: Case, *, rounds: int = 3, scipy_methods: Iterable[str] = METHO
     Args:
         case: the axis and the reference.
         rounds: turns of timing.
-        scipy_methods: methods of `solve_ivp` to try; the Jacobian is computed with the fastest right one.
+        scipy_methods: methods of `solve_ivp` to try.
         extras: take also what is not needed for the comparison: the twin with its coarsest steps, CasADi with constant
             steps.
 
@@ -137,27 +137,13 @@ def _compare(case: Case, entrants: list[Entrant], rounds: int) -> Comparison:
         rounds,
         lambda _, answer: _position_error(answer, positions) <= POSITION_LIMIT,
     )
-    chosen = [e for e in entrants if not _beaten(e, entrants, simulations, positions)]
     jacobians = time_interleaved(
-        {e.name: (e.jacobian, e.compiles) for e in chosen if e.jacobian},
+        {e.name: (e.jacobian, e.compiles) for e in entrants if e.jacobian},
         rounds,
         lambda _, answer: _jacobian_error(answer, jacobian) <= JACOBIAN_LIMIT,
     )
     row = partial(_row, simulations=simulations, jacobians=jacobians, positions=positions, exact=jacobian)
     return Comparison(case, [row(e) for e in entrants])
-
-
-def _beaten(entrant: Entrant, entrants: list[Entrant], timings: Mapping[str, Timing], positions: np.ndarray) -> bool:
-    """Whether another SciPy method simulates faster, so that its differences are faster too, which take long."""
-    if entrant.role != SCIPY:
-        return False
-    right = [
-        e
-        for e in entrants
-        if e.role == SCIPY and e.jacobian and _position_error(timings[e.name].answer, positions) <= POSITION_LIMIT
-    ]
-    fastest = min(right, key=lambda e: timings[e.name].spread.min, default=entrant)
-    return entrant.name != fastest.name
 
 
 def _row(

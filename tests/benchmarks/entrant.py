@@ -9,7 +9,7 @@ import numpy as np
 # A call shorter than this [s] is repeated within its round, so that a round is not decided by one interruption.
 _ROUND = 0.1
 # A call longer than this [s] averages the machine's noise by itself: it is made once.
-_LONG = 8.0
+_LONG = 4.0
 
 
 @dataclass(frozen=True)

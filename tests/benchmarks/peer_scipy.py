@@ -11,7 +11,7 @@ from tests.benchmarks.entrant import Entrant
 
 RTOL, ATOL = 1e-6, 1e-9
 METHODS = ("RK23", "RK45", "LSODA")
-# LSODA changes order and step as it goes: its differences are noise.
+# LSODA's changes of order and step length make its differences noise.
 DIFFERENTIABLE = ("RK23", "RK45")
 
 # Small enough for the curvature, large enough for the integrator's noise.

@@ -1,0 +1,108 @@
+"""The house rules: who imports whom, how classes are built, how long files are, and what an import does not do."""
+
+import ast
+import importlib
+import inspect
+import pkgutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ("twin", "sensitivity", "fitting")
+FORBIDDEN = {"twin": {"sensitivity", "fitting"}, "sensitivity": {"fitting"}, "fitting": set()}
+CORE = ("laws", "drives", "control", "references")
+CORE_FILES = ("simulation.py", "linear.py", "frf.py", "periodic.py", "plant.py", "stepping.py", "trajectory.py")
+NOT_IN_CORE = {"matplotlib", "pandas", "SALib", "pooch", "tomlkit", "pint", "json", "pathlib", "os"}
+
+
+def modules(path):
+    """Top-level packages, and whole names, that a file imports."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found.add(node.module)
+    return found
+
+
+def sources(room):
+    return sorted((ROOT / room).rglob("*.py"))
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_imports_go_one_way(room):
+    for path in sources(room):
+        wrong = {m for m in modules(path) if m.split(".")[0] in FORBIDDEN[room]}
+        assert not wrong, f"{path.relative_to(ROOT)} imports {wrong}"
+
+
+def test_core_knows_no_files_and_no_plots():
+    files = [p for room in CORE for p in sources(f"twin/{room}")] + [ROOT / "twin" / name for name in CORE_FILES]
+    for path in files:
+        names = modules(path)
+        wrong = {m for m in names if m.split(".")[0] in NOT_IN_CORE or m.startswith("twin.io")}
+        assert not wrong, f"{path.relative_to(ROOT)} imports {wrong}"
+
+
+def test_laws_know_no_drive_and_drives_no_controller():
+    for room, strangers in (("laws", ("twin.drives", "twin.control")), ("drives", ("twin.control",))):
+        for path in sources(f"twin/{room}"):
+            assert not {m for m in modules(path) if m.startswith(strangers)}, path
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_files_can_be_held_in_ones_head(room):
+    for path in [*sources(room), *sources("tests")]:
+        lines = len(path.read_text(encoding="utf-8").splitlines())
+        assert lines <= 300, f"{path.relative_to(ROOT)} has {lines} lines"
+
+
+def own_classes():
+    for room in ROOMS:
+        package = importlib.import_module(room)
+        for info in pkgutil.walk_packages(package.__path__, f"{room}."):
+            module = importlib.import_module(info.name)
+            for cls in vars(module).values():
+                if inspect.isclass(cls) and cls.__module__ == module.__name__:
+                    yield cls
+
+
+def test_every_class_is_abstract_or_final():
+    """equinox ignores `strict=True` (trap 39), so this looks for itself: nobody inherits from a concrete class."""
+    classes = list(own_classes())
+    assert len(classes) > 30
+    for cls in classes:
+        for base in cls.__mro__[1:]:
+            if base.__module__.split(".")[0] in ROOMS and base is not cls:
+                assert base.__name__.startswith("Abstract") or issubclass(cls, Exception), (
+                    f"{cls.__name__} inherits from the concrete class {base.__name__}"
+                )
+
+
+def test_every_public_thing_is_documented():
+    for cls in own_classes():
+        if not cls.__name__.startswith("_"):
+            assert cls.__doc__, cls
+
+
+def test_importing_changes_and_loads_nothing():
+    """No import switches x64 on, and plots, tables and SALib are not loaded before they are needed."""
+    code = (
+        "import sys, jax; before = jax.config.jax_enable_x64\n"
+        "import twin.simulation, twin.drives, twin.control, twin.linear, fitting.fit, fitting.identification.output_error\n"
+        "assert jax.config.jax_enable_x64 == before\n"
+        "assert not {'matplotlib', 'pandas', 'SALib', 'pint', 'pooch', 'tomlkit'} & set(sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_nothing_works_in_single_precision():
+    code = "import twin.drives\nfrom twin.laws import ViscousFriction\nViscousFriction(1.0)\n"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert "InputError" in done.stderr
+    assert "jax_enable_x64" in done.stderr

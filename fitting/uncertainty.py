@@ -95,8 +95,11 @@ def correlation_time(series: ArrayLike) -> float:
 
 
 def _memory(series: np.ndarray) -> int:
-    """Lag up to which neighbouring errors are allowed for: three half correlation times."""
-    return int(min(np.ceil(1.5 * correlation_time(series)), series.shape[1] // 4))
+    """Lag up to which neighbouring errors are allowed for.
+
+    Bartlett's weights fall linearly up to this lag; six correlation times leave out a tenth of the correlation.
+    """
+    return int(min(np.ceil(6 * correlation_time(series)), series.shape[1] // 4))
 
 
 def _long_run(scores: np.ndarray, lag: int) -> np.ndarray:

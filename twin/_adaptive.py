@@ -34,25 +34,26 @@ def solve_adaptive(
     varied, fixed = eqx.partition((plant, reference, state), eqx.is_inexact_array)
     settings, options = eqx.partition((times, stepping), eqx.is_array)
 
-    def rebuild(arrays: PyTree[Array]) -> tuple[AbstractPlant, AbstractReference, PyTree[Array]]:
+    # JAX hands constants to the rules below as NumPy arrays: the inner annotations say no more than PyTree.
+    def rebuild(arrays: PyTree) -> tuple[AbstractPlant, AbstractReference, PyTree]:
         return eqx.combine(arrays, fixed)
 
     @jax.custom_jvp
-    def solve(arrays: PyTree[Array], settings: PyTree[Array]) -> tuple[PyTree[Array], Int[Array, ""]]:
+    def solve(arrays: PyTree, settings: PyTree) -> tuple[PyTree, Int[Array, ""]]:
         plant, reference, state = rebuild(arrays)
         times, stepping = eqx.combine(settings, options)
         return _integrate(_field(plant, reference), state, times, reference, stepping)
 
     def with_directions(
-        arrays: PyTree[Array], directions: PyTree[Array], axes: PyTree[int | None], settings: PyTree[Array]
-    ) -> tuple[PyTree[Array], Int[Array, ""], PyTree[Array]]:
+        arrays: PyTree, directions: PyTree, axes: PyTree, settings: PyTree
+    ) -> tuple[PyTree, Int[Array, ""], PyTree]:
         """State and its derivative along several directions at once; `axes` says which leaves differ between them."""
         _, reference, state = rebuild(arrays)
         times, stepping = eqx.combine(settings, options)
         # A direction stands for about 100 % of its parameters, so that state and sensitivity share one tolerance.
         size = jax.vmap(lambda d: _relative_size(arrays, d), in_axes=(axes,))(directions)
 
-        def flow(arrays: PyTree[Array], t: Array, y: PyTree[Array]) -> PyTree[Array]:
+        def flow(arrays: PyTree, t: Array, y: PyTree) -> PyTree:
             plant, reference, _ = rebuild(arrays)
             return plant.vector_field(t, y, reference(t))
 
@@ -60,12 +61,12 @@ def solve_adaptive(
             value, sensitivity = y
             rate, derivative = jax.linearize(lambda a, v: flow(a, t, v), arrays, value)
 
-            def along(direction: PyTree[Array], scale: Array, s: PyTree[Array]) -> PyTree[Array]:
+            def along(direction: PyTree, scale: Array, s: PyTree) -> PyTree:
                 return derivative(jax.tree.map(lambda d: d / scale, direction), s)
 
             return rate, jax.vmap(along, in_axes=(axes, 0, 0))(directions, size, sensitivity)
 
-        def at_start(direction: PyTree[Array], scale: Array) -> PyTree[Array]:
+        def at_start(direction: PyTree, scale: Array) -> PyTree:
             _, d_state = jax.jvp(lambda a: rebuild(a)[2], (arrays,), (direction,))
             return jax.tree.map(lambda d: d / scale, d_state)
 
@@ -77,8 +78,8 @@ def solve_adaptive(
 
     @jax.custom_batching.custom_vmap
     def along_one(
-        arrays: PyTree[Array], direction: PyTree[Array], settings: PyTree[Array]
-    ) -> tuple[PyTree[Array], Int[Array, ""], PyTree[Array]]:
+        arrays: PyTree, direction: PyTree, settings: PyTree
+    ) -> tuple[PyTree, Int[Array, ""], PyTree]:
         directions = jax.tree.map(lambda d: d[None], direction)
         states, ending, tangents = with_directions(arrays, directions, jax.tree.map(lambda _: 0, directions), settings)
         return states, ending, jax.tree.map(lambda s: s[0], tangents)

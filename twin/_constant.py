@@ -25,14 +25,14 @@ def solve_constant(
     parameters, fixed = eqx.partition((plant, reference), eqx.is_inexact_array)
     ravel, unravel = flattener(state)
 
-    def step(parameters: PyTree[Array], x: Array, span: tuple[Array, Array], alone: bool) -> tuple[Array, Array]:
+    def step(parameters: PyTree[Array], x: Array, span: tuple[Array, Array]) -> tuple[Array, Array]:
         plant, reference = eqx.combine(parameters, fixed)
         begin, end = span
 
         def field(t: Array, y: PyTree[Array]) -> PyTree[Array]:
             return plant.vector_field(t, y, reference(t))
 
-        after, error = runge_kutta_steps(stepping, field, begin, end - begin, unravel(x), unrolled=alone)
+        after, error = runge_kutta_steps(stepping, field, begin, end - begin, unravel(x))
         return ravel(after), ravel(error)
 
     before, last, errors = run_recursion(step, parameters, ravel(state), (times[:-1], times[1:]))
@@ -61,14 +61,14 @@ def run_sampled_loop(
         memory, command = loop.controller.update(memory, wanted, loop.measure(t, state), loop.period)
         return state, memory, loop.inputs(command, added)
 
-    def step(parameters: PyTree[Array], x: Array, item: Any, alone: bool) -> tuple[Array, Array]:
+    def step(parameters: PyTree[Array], x: Array, item: Any) -> tuple[Array, Array]:
         loop = eqx.combine(parameters, fixed)
         state, memory, inputs = tick(loop, x, item)
 
         def field(time: Array, y: PyTree[Array]) -> PyTree[Array]:
             return loop.plant.vector_field(time, y, inputs)
 
-        after, error = runge_kutta_steps(stepping, field, item[0], loop.period, state, unrolled=alone)
+        after, error = runge_kutta_steps(stepping, field, item[0], loop.period, state)
         return ravel((after, memory)), ravel_state(error)
 
     def observe(x: Array, item: Any) -> tuple[Any, Any]:

@@ -13,7 +13,7 @@ _CHUNK = 256
 
 
 def run_recursion(
-    step: Callable[[PyTree[Array], Float[Array, " n"], PyTree[Array], bool], tuple[Float[Array, " n"], Array]],
+    step: Callable[[PyTree[Array], Float[Array, " n"], PyTree[Array]], tuple[Float[Array, " n"], Array]],
     parameters: PyTree[Array],
     start: Float[Array, " n"],
     items: PyTree[Array],
@@ -25,8 +25,8 @@ def run_recursion(
     recursion. The rule is linear in the tangents, so forward and reverse mode both work.
 
     Args:
-        step: function of (parameters, state, item, alone) that returns the next state, and something that is not
-            differentiated (an error estimate). `alone` tells that one step is evaluated at a time, not many together.
+        step: function of (parameters, state, item) that returns the next state, and something that is not
+            differentiated (an error estimate).
         parameters: arrays θ that every step sees.
         start: first state x[0].
         items: arrays u with a leading axis over the steps.
@@ -38,7 +38,7 @@ def run_recursion(
     @jax.custom_jvp
     def run(parameters: PyTree[Array], start: Array, items: PyTree[Array]) -> tuple[Array, Array, Array]:
         def body(x: Array, item: PyTree[Array]) -> tuple[Array, tuple[Array, Array]]:
-            after, extra = step(parameters, x, item, True)
+            after, extra = step(parameters, x, item)
             return after, (x, extra)
 
         last, (states, extras) = jax.lax.scan(body, start, items)
@@ -52,7 +52,7 @@ def run_recursion(
 
         def linearised(at: Any) -> tuple[Array, Array]:
             x, item, d_item = at
-            _, along = jax.linearize(lambda p, y, i: step(p, y, i, False)[0], parameters, x, item)
+            _, along = jax.linearize(lambda p, y, i: step(p, y, i)[0], parameters, x, item)
             still = jax.tree.map(jnp.zeros_like, (parameters, item))
             propagation = jax.vmap(lambda dx: along(still[0], dx, still[1]), out_axes=1)(jnp.eye(x.size))
             return propagation, along(d_parameters, jnp.zeros_like(x), d_item)

@@ -12,9 +12,6 @@ from jaxtyping import Array, ArrayLike, Float, PyTree
 
 from twin._checks import InputError, as_scalar, positive
 
-# Steps written out one after the other: more gain little and take minutes to compile.
-_WRITTEN_OUT = 8
-
 
 class AbstractStepping(eqx.Module):
     """A way of stepping a plant through time."""
@@ -71,18 +68,12 @@ class AdaptiveSteps(AbstractStepping):
 
 
 def runge_kutta_steps(
-    stepping: ConstantSteps,
-    vector_field: Callable,
-    start: Array,
-    length: Array,
-    state: PyTree[Array],
-    *,
-    unrolled: bool = True,
+    stepping: ConstantSteps, vector_field: Callable, start: Array, length: Array, state: PyTree[Array]
 ) -> tuple[PyTree[Array], PyTree[Array]]:
     """Explicit Runge-Kutta steps of equal length, with the stages written out.
 
     diffrax's own `step` runs its stages in a loop, which costs more than the whole arithmetic of a feed drive; written
-    out, XLA fuses them.
+    out, XLA fuses them. The steps themselves are looped over: writing them out too compiles longer and runs no faster.
 
     Args:
         stepping: number of steps, and the diffrax method whose tableau is used.
@@ -90,8 +81,6 @@ def runge_kutta_steps(
         start: time at the start [s].
         length: length of all steps together [s].
         state: state at the start.
-        unrolled: write out the steps too, up to 8, which is fast for one simulation; else loop over them, which
-            compiles fast and costs nothing in a batch.
 
     Returns:
         The state at the end, and the sum of the magnitudes of the embedded estimates of the local errors, in the same
@@ -112,11 +101,10 @@ def runge_kutta_steps(
         return (state, stages[-1] if tableau.fsal else vector_field(t + step, state), total), None
 
     carry = (state, vector_field(start, state), jax.tree.map(jnp.zeros_like, state))
-    if unrolled and stepping.substeps <= _WRITTEN_OUT:
-        for i in range(stepping.substeps):
-            carry, _ = one(carry, i)
+    if stepping.substeps == 1:
+        carry, _ = one(carry, 0)
     else:
-        carry, _ = jax.lax.scan(one, carry, jnp.arange(stepping.substeps), unroll=_WRITTEN_OUT if unrolled else 1)
+        carry, _ = jax.lax.scan(one, carry, jnp.arange(stepping.substeps))
     return carry[0], carry[2]
 
 

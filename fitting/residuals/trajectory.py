@@ -77,7 +77,7 @@ class TrajectoryResidual(AbstractResidual):
         return jnp.concatenate(parts)
 
 
-def relative_error_percent(measured: Float[ArrayLike, "samples"], simulated: Float[ArrayLike, "samples"]) -> float:
+def relative_error_percent(measured: Float[ArrayLike, "measured"], simulated: Float[ArrayLike, "simulated"]) -> float:
     """100·‖measured - simulated‖ / ‖measured‖.
 
     Args:

@@ -1,4 +1,4 @@
-"""Small systems that the tests share: inputs and controllers that the packages do not have, drives with known answers."""
+"""Small systems that the tests share: inputs and controllers of their own, drives with known answers."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float

@@ -77,9 +77,7 @@ def solve_adaptive(
         return states, ending, unscaled
 
     @jax.custom_batching.custom_vmap
-    def along_one(
-        arrays: PyTree, direction: PyTree, settings: PyTree
-    ) -> tuple[PyTree, Int[Array, ""], PyTree]:
+    def along_one(arrays: PyTree, direction: PyTree, settings: PyTree) -> tuple[PyTree, Int[Array, ""], PyTree]:
         directions = jax.tree.map(lambda d: d[None], direction)
         states, ending, tangents = with_directions(arrays, directions, jax.tree.map(lambda _: 0, directions), settings)
         return states, ending, jax.tree.map(lambda s: s[0], tangents)
@@ -146,10 +144,10 @@ def _integrate(
     return jax.tree.unflatten(structure, jax.tree.leaves(solution.ys)), ending
 
 
-def _relative_size(arrays: PyTree[Array], direction: PyTree[Array]) -> Float[Array, ""]:
+def _relative_size(arrays: PyTree, direction: PyTree) -> Float[Array, ""]:
     """The largest relative change of any parameter along a direction; 1 for no change at all."""
 
-    def largest(value: Array, change: Array) -> Array:
+    def largest(value: Any, change: Any) -> Array:
         return jnp.max(jnp.abs(change) / jnp.where(value == 0, 1.0, jnp.abs(value)), initial=0.0)
 
     size = jnp.max(jnp.stack(jax.tree.leaves(jax.tree.map(largest, arrays, direction))))

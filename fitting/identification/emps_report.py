@@ -125,7 +125,7 @@ def _text(study: EmpsStudy, summary: dict[str, Any]) -> str:
         f"Chosen (*) by cycle 4, refitted on the whole training record: train {_pair(best['train'])}, "
         f"test {_pair(best['test'])} (without the encoder zero {_pair(best['test_without_encoder_zero'])})",
         "Published, symmetric: train 5.85 / 0.229, test 8.94 / 0.479",
-        study.fit.to_dataframe()[["unit", "estimate", "standard error", "remark"]].round(9).to_string(),
+        *[f"    {p:54} {e.value:12.5g} ± {e.standard_error:.2g} {e.unit}" for p, e in study.fit.estimates().items()],
         study.fit.message,
     ]
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""Sampled and continuous loops: the control law by hand, limits, injection, lag of the amplifier, memory before the start."""
+"""Sampled and continuous loops: the law by hand, limits, injection, lag of the amplifier, memory before the start."""
 
 from typing import Any
 

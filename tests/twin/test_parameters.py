@@ -84,7 +84,7 @@ def test_order_units_and_look_up():
     assert SPACE.units == ("kg", "N", "N s/m", "N")
     assert len(SPACE) == 4
     assert SPACE["friction.coulomb"].upper == 40.0
-    with pytest.raises(InputError, match="No free parameter 'gain'; the space has mass, friction.coulomb"):
+    with pytest.raises(InputError, match=r"No free parameter 'gain'; the space has mass, friction\.coulomb"):
         SPACE["gain"]
 
 

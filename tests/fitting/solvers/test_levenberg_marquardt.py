@@ -23,7 +23,7 @@ def _beale(x, args=None):
 
 
 def _decay(x, factors=(1.0, 1.0, 1.0)):
-    """a·exp(-b·t) + c against data of a = 2, b = 1.3, c = 0.5 with a fixed disturbance; x in other units if asked for."""
+    """a·exp(-b·t) + c against data of a = 2, b = 1.3, c = 0.5 with a fixed disturbance; x in any units."""
     x = x / jnp.asarray(factors)
     data = 2 * np.exp(-1.3 * TIMES) + 0.5 + 0.02 * np.sin(40 * TIMES)
     return x[0] * jnp.exp(-x[1] * TIMES) + x[2] - data

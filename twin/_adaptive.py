@@ -34,9 +34,9 @@ def solve_adaptive(
     varied, fixed = eqx.partition((plant, reference, state), eqx.is_inexact_array)
     settings, options = eqx.partition((times, stepping), eqx.is_array)
 
-    # JAX hands constants to the rules below as NumPy arrays: the inner annotations say no more than PyTree.
     def rebuild(arrays: PyTree) -> tuple[AbstractPlant, AbstractReference, PyTree]:
-        return eqx.combine(arrays, fixed)
+        # JAX hands constants to the rules below as NumPy literals.
+        return eqx.combine(jax.tree.map(jnp.asarray, arrays), fixed)
 
     @jax.custom_jvp
     def solve(arrays: PyTree, settings: PyTree) -> tuple[PyTree, Int[Array, ""]]:

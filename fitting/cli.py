@@ -17,6 +17,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = _parser().parse_args(arguments)
     _run_small_loops_in_one_piece()
+    os.environ.setdefault("MPLBACKEND", "Agg")  # pictures go to files, also where there is no screen
     # Packages never change JAX's configuration; the program that uses them does.
     import jax
 
@@ -81,7 +82,7 @@ def _two_inertia(out: Path) -> str:
     summary = reproduce_two_inertia(out)
     lines = ["Two-mass drive fitted to record A, in units of the torque constant"]
     for path, estimate in summary["fit"]["parameters"].items():
-        lines.append(f"  {path:24} {estimate['value']:12.5g} ± {estimate['standard_error']:.2g} {estimate['unit']}")
+        lines.append(f"  {path:28} {estimate['value']:12.5g} ± {estimate['standard_error']:.2g} {estimate['unit']}")
     for source in ("model fitted to A, undamped", "record B, regression"):
         pair = summary["frequencies"][source]
         resonance, antiresonance = pair["resonance"]["value"], pair["antiresonance"]["value"]

@@ -87,9 +87,6 @@ def run_demo(out: Path) -> str:
     Args:
         out: folder for the results.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
     clock = time.perf_counter()
     truth, reference, space = demo_axis(), demo_reference(), demo_space()
     record = make_record(truth, reference)

@@ -68,7 +68,7 @@ def fit(
     space.check_start(model)
     solver = BoundedLevenbergMarquardt() if solver is None else solver
     _check_residual(residual, model, space)
-    held = set(hold)
+    held = {hold} if isinstance(hold, str) else set(hold)
     if len(held) == len(space.subset(held) if held else ()) == len(space):
         raise InputError("All parameters of the space are held; nothing is left to fit.")
     mask = jnp.asarray([path in held for path in space.paths])
@@ -148,9 +148,14 @@ def result_of(
     history = np.asarray(state.history)
     values = space.unscaled(solved.vector)
     held = set(hold)
+    priors = sum(p.prior is not None for p in space.parameters)
     free = np.flatnonzero([path not in held for path in space.paths])
     covariance = covariance_of(
-        state.residual, np.asarray(state.jacobian)[:, free], np.asarray(state.active)[free], series=correlated
+        state.residual,
+        np.asarray(state.jacobian)[:, free],
+        np.asarray(state.active)[free],
+        series=correlated,
+        priors=priors,
     )
     return FitResult(
         model=space.with_values(model, values),

@@ -98,6 +98,11 @@ class FitResult:
         return 0.5 * float(self.residual @ self.residual)
 
     @property
+    def rms(self) -> float:
+        """Root mean square of the weighted residual; near 1 where the model fits and the weights are right [-]."""
+        return float(np.sqrt(2 * self.cost / max(self.degrees_of_freedom, 1)))
+
+    @property
     def covariance(self) -> np.ndarray:
         """Covariance of the estimates in SI (parameters, parameters)."""
         slopes = np.asarray(self.space.slopes(jnp.asarray(self.values)))
@@ -117,7 +122,8 @@ class FitResult:
     def intervals(self, level: float = 0.95) -> np.ndarray:
         """Confidence intervals in SI (parameters, 2), by Student's t on the scale of each parameter.
 
-        On a log scale the interval is therefore unsymmetric and stays positive. NaN where a parameter sits on a bound
+        On a log scale the interval is therefore unsymmetric and stays positive; on a linear one it may reach beyond the
+        bounds. NaN where a parameter sits on a bound
         or is not seen.
 
         Args:
@@ -222,14 +228,15 @@ class FitResult:
         state = "converged" if self.success else "NOT converged"
         table = self.to_dataframe().to_html(float_format=lambda x: f"{x:.6g}")
         facts = (
-            f"{state} in {self.steps} steps, cost {self.cost:.6g}, {self.degrees_of_freedom} degrees of freedom, "
+            f"{state} in {self.steps} steps, weighted residual {self.rms:.4g} rms, "
+            f"{self.degrees_of_freedom} degrees of freedom, "
             f"condition number {self.condition_number:.3g}"
         )
         return f"<div><p><b>Fit</b>: {facts}.</p><p>{self.message}</p>{table}</div>"
 
     def __repr__(self) -> str:
         table = self.to_dataframe().to_string(float_format=lambda x: f"{x:.6g}")
-        return f"{table}\n{self.message}"
+        return f"{table}\nWeighted residual {self.rms:.4g} rms. {self.message}"
 
     def _named(self, mask: np.ndarray) -> str:
         return ", ".join(path for path, named in zip(self.space.paths, mask, strict=True) if named)

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import ArrayLike
 
+from twin._checks import InputError
+
 
 class Covariance(NamedTuple):
     """Covariance of the scaled vector, and what it says about the problem."""
@@ -20,7 +22,7 @@ class Covariance(NamedTuple):
 
 
 def covariance_of(
-    residual: ArrayLike, jacobian: ArrayLike, active: ArrayLike, *, series: int | None = None
+    residual: ArrayLike, jacobian: ArrayLike, active: ArrayLike, *, series: int | None = None, priors: int = 0
 ) -> Covariance:
     """Linear-theory covariance σ²(JᵀJ)⁻¹ by singular values of the column-normalised Jacobian.
 
@@ -34,6 +36,7 @@ def covariance_of(
         series: number of equally long time series that the residual consists of, if neighbouring errors hang together;
             the covariance is then Newey and West's (Econometrica 55, 1987), with the correlation of the scores up to
             the lag over which the residual forgets itself. None: errors are independent.
+        priors: number of rows at the end of the residual that are priors, not samples of a series.
 
     Returns:
         The covariance.
@@ -65,8 +68,11 @@ def covariance_of(
     normalised = variance * root @ root.T
     if series is not None:
         spread = root @ root.T / np.outer(norms[free], norms[free])
-        scores = (j[:, free] * r[:, None]).reshape(series, -1, free.size).sum(axis=0)
-        middle = _long_run(scores, _memory(r.reshape(series, -1)))
+        scores, samples = j[:, free] * r[:, None], r.size - priors
+        if samples % series:
+            raise InputError(f"{samples} residuals do not divide into {series} series of equal length.")
+        along = scores[:samples].reshape(series, -1, free.size).sum(axis=0)
+        middle = _long_run(along, _memory(r[:samples].reshape(series, -1))) + scores[samples:].T @ scores[samples:]
         normalised = spread @ middle @ spread * np.outer(norms[free], norms[free])
     known = ~unseen[free]
     block = normalised / np.outer(norms[free], norms[free])

@@ -20,7 +20,7 @@ class Parameter(eqx.Module):
     path: str = eqx.field(static=True)
     """Dotted path into the model, `friction.coulomb`; an index picks an element of a tuple or vector."""
     unit: str = eqx.field(static=True, default="")
-    """Unit of the value, for tables and files; values are SI."""
+    """SI unit of the value, for tables and files; nothing is converted."""
     lower: float = eqx.field(static=True, default=-float("inf"))
     """Lower bound, in the unit."""
     upper: float = eqx.field(static=True, default=float("inf"))
@@ -33,6 +33,11 @@ class Parameter(eqx.Module):
     """Mean and standard deviation of a Gaussian prior, in the unit."""
 
     def __check_init__(self):
+        if not (isinstance(self.path, str) and isinstance(self.unit, str)):
+            raise InputError(
+                f"Parameter takes a path, a unit and then bounds, but path is {self.path!r} and unit is {self.unit!r}. "
+                'Write Parameter("plant.mass", "kg", 10, 1000).'
+            )
         if self.scale not in ("linear", "log"):
             raise InputError(f'{self.path}: scale must be "linear" or "log", but is {self.scale!r}.')
         if np.isnan(self.lower) or np.isnan(self.upper):

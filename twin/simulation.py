@@ -51,13 +51,14 @@ def simulate(
     if times.ndim != 1 or times.shape[0] < 2:
         raise InputError(f"times must be a vector of at least two times [s], but has shape {times.shape}.")
     increasing("times", times, "s")
+    _check_reference(system, reference, times)
     if stepping is None:
         stepping = ConstantSteps() if isinstance(system, SampledLoop) else AdaptiveSteps()
 
     if isinstance(system, SampledLoop):
         if not isinstance(stepping, ConstantSteps):
             raise InputError("A sampled loop is simulated with ConstantSteps: its command jumps at every tick.")
-        _check_ticks(times, system.period)
+        check_ticks(times, system.period)
         plant_state = system.plant.initial_state() if initial_state is None else initial_state
         states, outputs, estimate = run_sampled_loop(system, reference, plant_state, times, stepping)
         return _trajectory(times, states, outputs, _judge(estimate), estimate)
@@ -133,6 +134,22 @@ def _close(coarse: Array, fine: Array, rtol: float, atol: float) -> bool:
     return bool(jnp.max(jnp.abs(coarse - fine)) <= atol + rtol * jnp.max(jnp.abs(fine)))
 
 
+def _check_reference(system: Any, reference: Any, times: Array) -> None:
+    if not isinstance(reference, AbstractReference):
+        raise InputError(
+            f"reference must be a reference, a function of time, but is a {type(reference).__name__}. "
+            "Make one of samples by SampledReference(times, positions)."
+        )
+    wanted = {"position"} if isinstance(system, SampledLoop) else set(system.rest_inputs()._fields)
+    given = getattr(jax.eval_shape(reference, times[0]), "_fields", ())
+    if not wanted <= set(given):
+        raise InputError(
+            f"{type(system).__name__} is driven by {', '.join(sorted(wanted))}, but the reference gives "
+            f"{', '.join(given) or 'something without names'}. To follow a motion, wrap drive and controller in a "
+            "ClosedLoop or SampledLoop; to drive it openly, use SampledSignal with the drive's inputs."
+        )
+
+
 def _judge(estimate: Float[Array, ""]) -> SimulationStatus:
     status = SimulationStatus.where(estimate <= 1.0, SimulationStatus.successful, SimulationStatus.not_accurate)
     return SimulationStatus.where(jnp.isfinite(estimate), status, SimulationStatus.not_finite)
@@ -151,7 +168,16 @@ def _trajectory(times, states, outputs, status, estimate) -> Trajectory:
     return Trajectory(times, jax.tree.map(mask, states), jax.tree.map(mask, outputs), status, estimate)
 
 
-def _check_ticks(times: Float[Array, "times"], period: Float[Array, ""]) -> None:
+def check_ticks(times: Float[Array, "times"], period: Float[Array, ""]) -> None:
+    """Raise unless times are the ticks of a sampled controller; `simulate` cannot tell inside a compiled function.
+
+    Args:
+        times: times [s].
+        period: period of the controller [s].
+
+    Raises:
+        InputError: naming the first period that does not fit.
+    """
     if not (is_concrete(times) and is_concrete(period)):
         return
     seen = np.asarray(times)

@@ -11,7 +11,7 @@ from twin._checks import InputError
 class SimulationStatus(eqx.Enumeration):
     """How a simulation ended; `SimulationStatus[status]` is a sentence on what to do."""
 
-    successful = ""
+    successful = "The simulation succeeded."
     not_finite = (
         "The simulation became NaN or infinite: the model is unstable for these parameters, or a parameter is outside "
         "its physical range. Look at the bounds and at the sign of gains and masses."

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fitting.identification.emps import EmpsStudy, Score, information_criteria, score, simulate_record
-from fitting.identification.emps_model import PERIOD, SCREW_LEAD, pulse_gain, with_screw_phase
+from fitting.identification.emps_model import CYCLE, PERIOD, SCREW_LEAD, pulse_gain, with_screw_phase
 from fitting.identification.inverse_dynamics import DerivativeFilter
 from fitting.plots import plot_comparison, plot_correlation, plot_intervals, plot_residual, save_figure
 from fitting.result import FitResult
@@ -27,9 +27,6 @@ def write_emps_report(study: EmpsStudy, out: Path) -> str:
         study: the study.
         out: folder, which exists.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
     summary = emps_summary(study)
     (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     fit = study.fit
@@ -102,7 +99,7 @@ def _number(value: float) -> float | None:
 def _repeatability(study: EmpsStudy) -> float:
     """Half the difference of two cycles relative to the force: what no model of this kind can explain."""
     voltage = np.asarray(study.train.record.channel("voltage"))
-    second, third = voltage[6240:12480], voltage[12480:18720]
+    second, third = voltage[CYCLE : 2 * CYCLE], voltage[2 * CYCLE : 3 * CYCLE]
     return float(100 * np.linalg.norm(second - third) / np.sqrt(2) / np.linalg.norm(second))
 
 

@@ -16,9 +16,12 @@ from twin.parameters import ParameterSpace
 from twin.plant import AbstractPlant
 from twin.record import Record
 from twin.references import AbstractReference
-from twin.simulation import simulate
+from twin.simulation import check_ticks, simulate
 from twin.stepping import AbstractStepping
 from twin.trajectory import SimulationStatus
+
+# Weighted residuals have a root mean square near 1 where model and deviations are right.
+_MISFIT = 5.0
 
 
 def output_error(
@@ -37,7 +40,8 @@ def output_error(
     """Fit a simulated system to a record.
 
     Only the reference drives the simulation; what was measured is compared, not fed in. Noise on the record therefore
-    does not bias the estimates, which it does in inverse dynamics.
+    does not bias the estimates, which it does in inverse dynamics. The system must start where the record starts: set
+    its initial position and velocity from the record, or free them.
 
     Args:
         record: measured channels, named as outputs of the system.
@@ -58,6 +62,8 @@ def output_error(
     Raises:
         InputError: as `fit`, or for a channel that does not exist.
     """
+    if isinstance(system, SampledLoop):
+        check_ticks(record.times, system.period)
     residual = TrajectoryResidual.create(record, reference, deviation, stepping=stepping)
     result = fit(
         residual,
@@ -68,10 +74,16 @@ def output_error(
         hold=hold,
         correlated=len(deviation) if correlated else None,
     )
+    warnings = []
+    if result.rms > _MISFIT:
+        warnings.append(
+            f"What is left over is {result.rms:.3g} times the deviations given: a wrong unit, period or initial state, "
+            "deviations that are too small, or a model that lacks something. Plot the residual."
+        )
     status = _final_status(result.model, reference, record.times, stepping)
-    if status == SimulationStatus.successful:
-        return result
-    return dataclasses.replace(result, warning=f"The fitted model's simulation: {SimulationStatus[status]}")
+    if status != SimulationStatus.successful:
+        warnings.append(f"The fitted model's simulation: {SimulationStatus[status]}")
+    return dataclasses.replace(result, warning=" ".join(warnings))
 
 
 @eqx.filter_jit

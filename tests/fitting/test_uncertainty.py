@@ -54,3 +54,14 @@ def test_parameters_that_trade_places_are_both_unseen():
     assert np.isinf(found.condition_number)
     assert np.isfinite(found.matrix[2, 2])
     assert np.isnan(found.matrix[0, 0])
+
+
+def test_priors_are_no_samples_of_a_series():
+    """A prior row counts once, wherever the series end."""
+    rng = np.random.default_rng(6)
+    series = autoregressive(rng, 3000, 0.5)
+    jacobian, residual = np.vstack([np.ones((3000, 1)), [[100.0]]]), np.append(series - series.mean(), 0.0)
+    found = covariance_of(residual, jacobian, np.zeros(1, dtype=bool), series=1, priors=1)
+    assert 0 < found.matrix[0, 0] < 1e-3
+    with pytest.raises(ValueError, match="3001 residuals do not divide into 2 series"):
+        covariance_of(residual, jacobian, np.zeros(1, dtype=bool), series=2)

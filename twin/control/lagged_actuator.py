@@ -6,7 +6,7 @@ import equinox as eqx
 import jax
 from jaxtyping import Array, Float, PyTree
 
-from twin._checks import as_scalar, positive
+from twin._checks import as_scalar, finite, positive
 from twin.plant import AbstractPlant
 
 
@@ -35,6 +35,7 @@ class LaggedActuator(AbstractPlant):
 
     def __check_init__(self):
         positive("time_constant of the actuator", self.time_constant, "s")
+        finite("initial_command", self.initial_command)
 
     def initial_state(self) -> LaggedActuatorState:
         actual = jax.tree.map(lambda zero: zero + self.initial_command, self.plant.rest_inputs().command)

@@ -62,6 +62,8 @@ class ServoAxis(AbstractPlant):
         positive("mass", self.mass, "kg")
         finite("gain", self.gain)
         finite("offset", self.offset, "N")
+        finite("initial_position", self.initial_position, "m")
+        finite("initial_velocity", self.initial_velocity, "m/s")
 
     def initial_state(self) -> ServoAxisState:
         return ServoAxisState(self.initial_position, self.initial_velocity, self.friction.initial_state())

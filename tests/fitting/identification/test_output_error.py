@@ -104,6 +104,24 @@ def test_channels_that_cannot_be_compared_are_refused(clean, deviation, message)
         output_error(record, START, REFERENCE, SPACE, deviation=deviation, stepping=STEPPING)
 
 
+def test_a_fit_that_does_not_fit_says_so(clean):
+    """Millimetres taken for metres: the solver converges all the same."""
+    record = Record.create(
+        np.asarray(TIMES), {"position": 1e3 * np.asarray(clean.channel("position"))}, {"position": "m"}
+    )
+    result = output_error(record, START, REFERENCE, SPACE, deviation={"position": 2e-6}, stepping=STEPPING)
+    assert result.rms > 5
+    assert "times the deviations given: a wrong unit" in result.message
+
+
+def test_ticks_that_miss_the_period_are_refused_before_the_fit(clean):
+    record = Record.create(
+        2 * np.asarray(TIMES), {"position": np.asarray(clean.channel("position"))}, {"position": "m"}
+    )
+    with pytest.raises(InputError, match="ticks of the sampled controller"):
+        output_error(record, START, REFERENCE, SPACE, deviation={"position": 2e-6}, stepping=STEPPING)
+
+
 def test_relative_error():
     assert relative_error_percent(np.array([3.0, 4.0]), np.array([3.0, 3.0])) == pytest.approx(20.0)
     with pytest.raises(InputError, match="same samples"):

@@ -163,8 +163,3 @@ def test_a_traced_start_passes():
 def test_bad_input_is_named(make, said):
     with pytest.raises(InputError, match=said):
         make()
-
-
-def test_a_parameter_without_a_unit_in_its_place_is_refused():
-    with pytest.raises(InputError, match="takes a path, a unit and then bounds"):
-        Parameter("plant.mass", 10, 1000)  # pyright: ignore[reportArgumentType]

@@ -90,7 +90,11 @@ def test_injection_acts_behind_the_controller_and_the_amplifier_limits_their_sum
     load = np.where(TICKS > 0.08, -20.0, 0.0)
     injection = SampledSignal(TICKS, DriveInputs(pulse, load), interpolation="hold")
     loop = SampledLoop(
-        viscous_axis(gain=35.0), SampledPositionVelocity(50.0, 100.0, command_limit=4.0), T, injection, command_limit=5.0
+        viscous_axis(gain=35.0),
+        SampledPositionVelocity(50.0, 100.0, command_limit=4.0),
+        T,
+        injection,
+        command_limit=5.0,
     )
     reference = SampledReference(TICKS, 0.01 + 0.0 * TICKS)
     trajectory = run(loop, reference, TICKS)
@@ -170,7 +174,10 @@ def test_a_closed_loop_is_a_plant_at_rest():
         (lambda: SampledPositionVelocity(1.0, np.nan), "velocity_gain"),
         (lambda: SampledPositionVelocity(1.0, 1.0, command_limit=0.0), "command_limit"),
         (lambda: SampledLoop(viscous_axis(), SampledPositionVelocity(1.0, 1.0), 0.0), "period"),
-        (lambda: SampledLoop(viscous_axis(), SampledPositionVelocity(1.0, 1.0), T, command_limit=-1.0), "command_limit"),
+        (
+            lambda: SampledLoop(viscous_axis(), SampledPositionVelocity(1.0, 1.0), T, command_limit=-1.0),
+            "command_limit",
+        ),
         (lambda: LaggedActuator(viscous_axis(), 0.0), "time_constant"),
     ],
 )

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from twin._checks import InputError
 from twin.control import EncoderMemory, LaggedActuator, SampledLoop, SampledPositionVelocity
@@ -158,7 +159,7 @@ def on_record(model: SampledLoop, data: EmpsRecord) -> SampledLoop:
     return eqx.tree_at(of_the_record, model, of_the_record(emps_start(data)), is_leaf=lambda x: x is None)
 
 
-def with_screw_phase(model: SampledLoop, origin: float | np.ndarray) -> SampledLoop:
+def with_screw_phase(model: SampledLoop, origin: float | Array | np.ndarray) -> SampledLoop:
     """The axis with the phase of everything that repeats with the screw moved.
 
     Args:

@@ -1,34 +1,27 @@
 """From data to parameters: the front door of fitting."""
 
-from collections.abc import Iterable
-from typing import Any, TypeVar
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
-from jaxtyping import Array, Bool, Float
 
+from fitting.constraints import AbstractConstraint, check_constraints
 from fitting.residuals.residual import AbstractResidual
 from fitting.result import FitResult
-from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt, BoundedState, Stop
+from fitting.solve import Solved, Solver, solve
+from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt
+from fitting.solvers.slsqp import SLSQP
+from fitting.solvers.stop import STOPS, Stop
 from fitting.uncertainty import covariance_of
 from twin._checks import InputError, require_x64
 from twin.parameters import ParameterSpace
 
-Model = TypeVar("Model")
 
-
-class Solved(eqx.Module):
-    """What the compiled part of a fit returns; batches of fits are batches of this."""
-
-    vector: Float[Array, "parameters"]
-    """Scaled vector at the end."""
-    state: BoundedState
-    """Final state of the solver: residual, Jacobian, active bounds, history."""
-    reason: Stop
-    """Why the solver stopped."""
+class FitError(RuntimeError):
+    """A fit that did not converge, where the caller asked to be told by an exception."""
 
 
 def fit(
@@ -36,104 +29,66 @@ def fit(
     model: Any,
     space: ParameterSpace,
     *,
-    solver: BoundedLevenbergMarquardt | None = None,
+    constraints: Sequence[AbstractConstraint] = (),
+    solver: Solver | None = None,
     max_steps: int = 100,
     hold: Iterable[str] = (),
     correlated: int | None = None,
+    variance: str = "estimated",
     throw: bool = False,
 ) -> FitResult:
-    """Fit the free parameters of a model to data, by least squares within bounds.
+    """Fit the free parameters of a model to data, by least squares within bounds and general constraints.
 
     Args:
         residual: evidence; called with a model, it returns the weighted residual.
         model: start of the fit; what is not free stays as it is here.
         space: free parameters.
-        solver: settings of the Levenberg-Marquardt solver.
+        constraints: conditions on the model, `Equality(function)` or `Inequality(function)`; the functions are defined
+            once and kept (a new lambda for every fit compiles anew).
+        solver: `BoundedLevenbergMarquardt` or `SLSQP`, with their settings. By default the former, which knows that the
+            cost is a sum of squares; the latter where there are general constraints.
         max_steps: steps after which the fit is given up.
         hold: paths of the space to hold at their start this time. A ladder of models that differ in what is free is
             then compiled once.
         correlated: number of equally long series, one after the other, that the residual consists of, if its errors
             hang together from sample to sample (a model error over time does); the covariance then allows for it. By
             default errors count as independent.
+        variance: "estimated" from the residual, or "known" where the weights are exact.
         throw: raise if the fit did not converge, instead of marking the result.
 
     Returns:
         The fitted model with estimates, their uncertainty and a status.
 
     Raises:
-        InputError: unknown path, start outside its bounds, fewer data than parameters; with `throw`, a fit that did not
-            converge.
+        InputError: unknown path, start outside its bounds, fewer data than parameters, a constraint that returns no
+            vector, constraints for a solver that takes none.
+        FitError: with `throw`, a fit that did not converge.
     """
     require_x64()
     space.check_start(model)
-    solver = BoundedLevenbergMarquardt() if solver is None else solver
-    _check_residual(residual, model, space)
+    constraints = tuple(constraints)
+    solver = chosen_solver(solver, constraints)
+    check_residual(residual, model, space)
+    check_constraints(constraints, model)
     held = {hold} if isinstance(hold, str) else set(hold)
     if len(held) == len(space.subset(held) if held else ()) == len(space):
         raise InputError("All parameters of the space are held; nothing is left to fit.")
     mask = jnp.asarray([path in held for path in space.paths])
-    solved = solve(residual, model, space, solver, max_steps, mask)
-    result = result_of(solved, model, space, hold=held, correlated=correlated)
+    solved = solve(residual, model, space, solver, max_steps, mask, constraints)
+    result = result_of(solved, model, space, hold=held, correlated=correlated, variance=variance)
     if throw and not result.success:
-        raise InputError(f"The fit did not succeed. {result.message}")
+        raise FitError(f"The fit did not succeed. {result.message}")
     return result
 
 
-@eqx.filter_jit
-def solve(
-    residual: AbstractResidual,
-    model: Any,
-    space: ParameterSpace,
-    solver: BoundedLevenbergMarquardt,
-    max_steps: int,
-    held: Bool[Array, "parameters"] | None = None,
-) -> Solved:
-    """The compiled part of a fit: pure, so that it can be batched by `eqx.filter_vmap`.
-
-    Args:
-        residual: as in `fit`.
-        model: as in `fit`.
-        space: as in `fit`.
-        solver: as in `fit`.
-        max_steps: as in `fit`.
-        held: which parameters stay at their start.
-    """
-    return solve_raw(residual, model, space, solver, max_steps, held)
-
-
-def solve_raw(
-    residual: AbstractResidual,
-    model: Any,
-    space: ParameterSpace,
-    solver: BoundedLevenbergMarquardt,
-    max_steps: int,
-    held: Bool[Array, "parameters"] | None = None,
-) -> Solved:
-    """`solve` without its own compilation, for use inside other compiled functions."""
-
-    def objective(vector: Array, args: Any) -> Array:
-        evidence, start = args
-        values = space.unscaled(vector)
-        return jnp.concatenate([evidence(space.with_values(start, values)), space.prior_residual(values)])
-
-    start, lower, upper = space.pack(model), space.lower, space.upper
-    if held is not None:
-        # Bounds that meet at the start hold a parameter, and the compiled program stays the same.
-        lower, upper = jnp.where(held, start, lower), jnp.where(held, start, upper)
-    solution = optx.least_squares(
-        objective,
-        solver,
-        start,
-        args=(residual, model),
-        options={"lower": lower, "upper": upper},
-        max_steps=max_steps + 1,  # the first evaluates the start
-        throw=False,
-    )
-    return Solved(solution.value, solution.state, solution.stats["reason"])
-
-
 def result_of(
-    solved: Solved, model: Any, space: ParameterSpace, *, hold: Iterable[str] = (), correlated: int | None = None
+    solved: Solved,
+    model: Any,
+    space: ParameterSpace,
+    *,
+    hold: Iterable[str] = (),
+    correlated: int | None = None,
+    variance: str = "estimated",
 ) -> FitResult:
     """The result of one fit, from what its compiled part returned.
 
@@ -143,19 +98,22 @@ def result_of(
         space: free parameters.
         hold: as in `fit`.
         correlated: as in `fit`.
+        variance: as in `fit`.
     """
-    state = solved.state
-    history = np.asarray(state.history)
+    history = np.asarray(solved.history)
     values = space.unscaled(solved.vector)
     held = set(hold)
     priors = sum(p.prior is not None for p in space.parameters)
     free = np.flatnonzero([path not in held for path in space.paths])
     covariance = covariance_of(
-        state.residual,
-        np.asarray(state.jacobian)[:, free],
-        np.asarray(state.active)[free],
+        solved.residual,
+        np.asarray(solved.jacobian)[:, free],
+        np.asarray(solved.active)[free],
         series=correlated,
         priors=priors,
+        curvature=None if solved.curvature is None else np.asarray(solved.curvature),
+        normals=np.asarray(solved.normals)[:, free],
+        variance=variance,
     )
     return FitResult(
         model=space.with_values(model, values),
@@ -163,32 +121,79 @@ def result_of(
         values=np.asarray(values)[free],
         scaled=np.asarray(solved.vector)[free],
         scaled_covariance=covariance.matrix,
+        factor=_factor(np.asarray(solved.jacobian)[:, free]),
         condition_number=covariance.condition_number,
         degrees_of_freedom=covariance.degrees_of_freedom,
         unseen=covariance.unseen,
-        active=np.asarray(state.active)[free],
-        residual=np.asarray(state.residual),
+        active=np.asarray(solved.active)[free],
+        residual=np.asarray(solved.residual),
         cost_history=history[np.isfinite(history)],
-        steps=int(state.steps),
-        stop=_name_of(solved.reason),
-        offset=float(state.offset),
+        steps=int(solved.steps),
+        stop=name_of(solved.reason),
+        offset=float(solved.offset),
+        variance=variance,
     )
 
 
-def _name_of(reason: Stop) -> str:
-    for name in ("running", "converged", "at_precision", "stalled", "not_finite", "too_many_steps"):
+def _factor(jacobian: np.ndarray) -> np.ndarray:
+    if not np.all(np.isfinite(jacobian)):
+        return np.full((jacobian.shape[1],) * 2, np.nan)
+    short = max(0, jacobian.shape[1] - jacobian.shape[0])
+    return np.asarray(np.linalg.qr(np.vstack([jacobian, np.zeros((short, jacobian.shape[1]))]), mode="r"))
+
+
+def name_of(reason: Stop) -> str:
+    """Name of a reason for stopping, as it is kept in results.
+
+    Args:
+        reason: of one fit.
+    """
+    for name in STOPS:
         if bool(reason == getattr(Stop, name)):
             return name
     raise AssertionError("unknown reason")  # pragma: no cover
 
 
-def _check_residual(residual: AbstractResidual, model: Any, space: ParameterSpace) -> None:
+def chosen_solver(solver: Solver | None, constraints: tuple[AbstractConstraint, ...]) -> Solver:
+    """The solver to use: by default Levenberg-Marquardt, and SLSQP where there are general constraints.
+
+    Args:
+        solver: the user's choice, if any.
+        constraints: general constraints.
+
+    Raises:
+        InputError: constraints for a solver that takes none.
+    """
+    if solver is None:
+        return SLSQP() if constraints else BoundedLevenbergMarquardt()
+    if constraints and not isinstance(solver, SLSQP):
+        raise InputError(f"{type(solver).__name__} takes no general constraints. Use SLSQP, or leave the solver out.")
+    return solver
+
+
+def check_residual(residual: AbstractResidual, model: Any, space: ParameterSpace) -> int:
+    """Raise unless a residual is a vector with at least as many entries as there are parameters.
+
+    Args:
+        residual: as in `fit`.
+        model: as in `fit`.
+        space: as in `fit`.
+
+    Returns:
+        The number of residuals, priors not counted.
+
+    Raises:
+        InputError: naming what is wrong.
+    """
     shape = jax.eval_shape(eqx.filter_jit(residual), model)
     priors = sum(p.prior is not None for p in space.parameters)
     if len(shape.shape) != 1:
         raise InputError(f"A residual must be a vector, but this one has shape {shape.shape}.")
+    if shape.shape[0] == 0:
+        raise InputError("The residual is empty: there are no data to fit. Look at what the record or band leaves.")
     if shape.shape[0] + priors < len(space):
         raise InputError(
             f"{shape.shape[0]} residuals cannot determine {len(space)} parameters. "
             "Add data or priors, or free fewer parameters."
         )
+    return shape.shape[0]

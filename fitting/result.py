@@ -9,15 +9,15 @@ import jax.numpy as jnp
 import numpy as np
 from scipy import stats
 
-from fitting.solvers.levenberg_marquardt import Stop
+from fitting.solvers.stop import CONVERGED, Stop
 from twin._checks import InputError
 from twin.parameters import Parameter, ParameterSpace
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_ARRAYS = ("values", "scaled", "scaled_covariance", "unseen", "active", "residual", "cost_history")
-_FORMAT = 1
+_ARRAYS = ("values", "scaled", "scaled_covariance", "factor", "unseen", "active", "residual", "cost_history")
+_FORMAT = 2
 
 
 class Estimate(NamedTuple):
@@ -45,6 +45,9 @@ class FitResult:
     """Estimates as the solver's scaled vector (parameters,)."""
     scaled_covariance: np.ndarray
     """Covariance of the scaled vector (parameters, parameters)."""
+    factor: np.ndarray
+    """Upper triangular R with RᵀR = JᵀJ, the information on the scaled vector that data and priors hold (parameters,
+    parameters)."""
     condition_number: float
     """Condition of the column-normalised Jacobian; above some 1e4 parameters trade places with each other."""
     degrees_of_freedom: int
@@ -63,13 +66,15 @@ class FitResult:
     """Name of the reason for stopping, one of `Stop`."""
     offset: float
     """Relative offset at the end: how much of the residual the linear model could still remove."""
+    variance: str = "estimated"
+    """"estimated" from the residual, or "known" where the weights were taken to be exact."""
     warning: str = ""
     """What else the procedure has to say about this fit."""
 
     @property
     def success(self) -> bool:
         """Whether the fit converged."""
-        return self.stop in ("converged", "at_precision")
+        return self.stop in CONVERGED
 
     @property
     def message(self) -> str:
@@ -84,6 +89,11 @@ class FitResult:
             parts.append(
                 f"Not determined by these data: {self._named(self.unseen)}. Hold some fixed, give priors, or measure "
                 "something that sees them."
+            )
+        elif self.success and np.isnan(np.diag(self.scaled_covariance))[~self.active].any():
+            parts.append(
+                "There are no standard errors: no data are left over to estimate a variance from, or the point is no "
+                "minimum of the robust loss (start that from a Huber fit)."
             )
         elif self.condition_number > 1e6:
             parts.append(
@@ -117,7 +127,9 @@ class FitResult:
     def correlation(self) -> np.ndarray:
         """Correlation of the estimates (parameters, parameters)."""
         error = np.sqrt(np.diag(self.scaled_covariance))
-        return self.scaled_covariance / np.outer(error, error)
+        sizes = np.outer(error, error)
+        # What a constraint fixes has no variance, and no correlation.
+        return np.divide(self.scaled_covariance, sizes, out=np.full_like(sizes, np.nan), where=sizes > 0)
 
     def intervals(self, level: float = 0.95) -> np.ndarray:
         """Confidence intervals in SI (parameters, 2), by Student's t on the scale of each parameter.
@@ -134,9 +146,10 @@ class FitResult:
         """
         if not 0 < level < 1:
             raise InputError(f"level must be between 0 and 1, but is {level}.")
-        if self.degrees_of_freedom < 1:
+        freedom = np.inf if self.variance == "known" else self.degrees_of_freedom
+        if freedom < 1:
             return np.full((len(self.space), 2), np.nan)
-        reach = stats.t.ppf(0.5 + level / 2, self.degrees_of_freedom) * np.sqrt(np.diag(self.scaled_covariance))
+        reach = stats.t.ppf(0.5 + level / 2, freedom) * np.sqrt(np.diag(self.scaled_covariance))
         ends = [np.asarray(self.space.unscaled(jnp.asarray(self.scaled + side * reach))) for side in (-1, 1)]
         return np.stack(ends, axis=1)
 
@@ -188,6 +201,7 @@ class FitResult:
             "steps": self.steps,
             "stop": self.stop,
             "offset": self.offset,
+            "variance": self.variance,
             "warning": self.warning,
         }
         np.savez(path, head=np.asarray(json.dumps(head)), **{name: getattr(self, name) for name in _ARRAYS})

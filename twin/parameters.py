@@ -13,6 +13,15 @@ from twin.paths import get_leaf, set_leaves
 
 Model = TypeVar("Model")
 
+# Starts of tied parameters that agree to this are taken to be equal; they may come from different sums.
+_SAME = 1e-9
+
+
+def _as_paths(value: Any) -> Any:
+    if isinstance(value, str):
+        raise InputError(f"tied must be a tuple of paths, but is the text {value!r}. Write tied=({value!r},).")
+    return tuple(value)
+
 
 class Parameter(eqx.Module):
     """One free parameter: where it is in the model, its unit, bounds and scale."""
@@ -31,6 +40,8 @@ class Parameter(eqx.Module):
     """Typical magnitude of the value on the linear scale; if not given, its bounds' range or else 1."""
     prior: tuple[float, float] | None = eqx.field(static=True, default=None)
     """Mean and standard deviation of a Gaussian prior, in the unit."""
+    tied: tuple[str, ...] = eqx.field(static=True, default=(), converter=_as_paths)
+    """Other paths that always take the same value, such as the same mass in the models of several data sets."""
 
     def __check_init__(self):
         if not (isinstance(self.path, str) and isinstance(self.unit, str)):
@@ -89,10 +100,14 @@ class ParameterSpace(eqx.Module):
         if not self.parameters:
             raise InputError("A parameter space needs at least one parameter.")
         seen = set()
-        for path in self.paths:
-            if path in seen:
-                raise InputError(f"Parameter {path!r} is in the space twice. Remove one.")
-            seen.add(path)
+        for parameter in self.parameters:
+            for path in (parameter.path, *parameter.tied):
+                if path in seen:
+                    raise InputError(
+                        f"Parameter {path!r} is in the space twice. Remove one; a path is either free, or tied to one "
+                        "other."
+                    )
+                seen.add(path)
 
     def __len__(self) -> int:
         return len(self.parameters)
@@ -101,6 +116,9 @@ class ParameterSpace(eqx.Module):
         for parameter in self.parameters:
             if parameter.path == path:
                 return parameter
+        for parameter in self.parameters:
+            if path in parameter.tied:
+                raise InputError(f"{path!r} is tied to {parameter.path!r}. Ask for that one.")
         raise InputError(f"No free parameter {path!r}; the space has {', '.join(self.paths)}.")
 
     @property
@@ -124,7 +142,7 @@ class ParameterSpace(eqx.Module):
         return self._scaled_bounds("upper")
 
     def values(self, model: Any) -> Float[Array, "parameters"]:
-        """The free parameters' values in a model, SI.
+        """The free parameters' values in a model, SI; of tied ones the first's.
 
         Raises:
             InputError: if a path is not in the model.
@@ -133,8 +151,9 @@ class ParameterSpace(eqx.Module):
         return jnp.stack([jnp.asarray(get_leaf(model, path)) for path in self.paths])
 
     def with_values(self, model: Model, values: Float[Array, "parameters"]) -> Model:
-        """The model with its free parameters set to values in SI."""
-        return set_leaves(model, {path: values[i] for i, path in enumerate(self.paths)})
+        """The model with its free parameters, and those tied to them, set to values in SI."""
+        ties = enumerate(self.parameters)
+        return set_leaves(model, {path: values[i] for i, p in ties for path in (p.path, *p.tied)})
 
     def pack(self, model: Any) -> Float[Array, "parameters"]:
         """The scaled vector of a model's free parameters."""
@@ -170,12 +189,14 @@ class ParameterSpace(eqx.Module):
         return jnp.stack(rows) if rows else jnp.zeros((0,))
 
     def check_start(self, model: Any) -> None:
-        """Raise unless the model's values are finite and within the bounds.
+        """Raise unless the model's values are finite and within the bounds, and tied ones are equal.
 
         Raises:
-            InputError: naming the parameter, its value and its bounds.
+            InputError: naming the parameter, its value and its bounds, or the two values that differ.
         """
         values = self.values(model)
+        for parameter in self.parameters:
+            _check_ties(parameter, model)
         if not is_concrete(values):
             return
         for parameter, value in zip(self.parameters, np.asarray(values), strict=True):
@@ -192,6 +213,20 @@ class ParameterSpace(eqx.Module):
         require_x64()
         values = jnp.asarray([getattr(p, side) for p in self.parameters], dtype=jnp.float64)
         return self.scaled(values)
+
+
+def _check_ties(parameter: Parameter, model: Any) -> None:
+    first = get_leaf(model, parameter.path)
+    for path in parameter.tied:
+        other = get_leaf(model, path)
+        if not (is_concrete(first) and is_concrete(other)):
+            continue
+        a, b = float(first), float(other)
+        if not abs(a - b) <= _SAME * max(abs(a), abs(b)) and np.isfinite(a):
+            raise InputError(
+                f"{parameter.path} and {path} are tied, but start at {a:.10g} and {b:.10g} {parameter.unit}. Give both "
+                f"one value; space.with_values(model, space.values(model)) takes that of {parameter.path} for both."
+            )
 
 
 def _refuse_log(parameter: Parameter) -> None:

@@ -36,6 +36,19 @@ def get_leaf(model: Any, path: str) -> Array:
     return value
 
 
+def get_part(model: Any, path: str) -> Any:
+    """The part of a model that a dotted path names: a plant in a loop, or one model of several.
+
+    Args:
+        model: a module, or a dict or tuple of modules.
+        path: attribute names, keys and indices joined by dots.
+
+    Raises:
+        InputError: if there is no such path.
+    """
+    return _walk(model, path)
+
+
 def set_leaves(model: Model, values: dict[str, Any]) -> Model:
     """The model with the numbers at several dotted paths replaced.
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import equinox as eqx
-from jaxtyping import Array
+from jaxtyping import Array, ArrayLike
 
 from fitting.fit import fit
 from fitting.residuals.trajectory import TrajectoryResidual
@@ -30,7 +30,7 @@ def output_error(
     reference: AbstractReference,
     space: ParameterSpace,
     *,
-    deviation: Mapping[str, float],
+    deviation: Mapping[str, ArrayLike],
     stepping: AbstractStepping | None = None,
     solver: BoundedLevenbergMarquardt | None = None,
     max_steps: int = 100,

@@ -29,8 +29,9 @@ class TrajectoryResidual(AbstractResidual):
     """What drove the system while it was measured."""
     measured: tuple[Float[Array, "times"], ...]
     """Measured samples, one vector per channel."""
-    deviation: tuple[Float[Array, ""], ...]
-    """Standard deviation of each channel's noise, in the channel's unit: one over the weight."""
+    deviation: tuple[Float[Array, ""] | Float[Array, "times"], ...]
+    """Standard deviation of each channel's noise, in the channel's unit, one for all samples or one for each: one over
+    the weight."""
     channels: tuple[str, ...] = eqx.field(static=True)
     """Names of the outputs compared."""
     stepping: AbstractStepping | None = None
@@ -40,7 +41,7 @@ class TrajectoryResidual(AbstractResidual):
     def create(
         record: Record,
         reference: AbstractReference,
-        deviation: Mapping[str, float],
+        deviation: Mapping[str, ArrayLike],
         *,
         stepping: AbstractStepping | None = None,
     ) -> "TrajectoryResidual":
@@ -49,21 +50,23 @@ class TrajectoryResidual(AbstractResidual):
         Args:
             record: measured channels, named as the outputs of the system.
             reference: what drove the system.
-            deviation: standard deviation per channel to compare, in the channel's SI unit.
+            deviation: standard deviation per channel to compare, in the channel's SI unit: a number, or one for each
+                sample (samples,). `twin.repeats.repeated` gives it from repeated records.
             stepping: how time is stepped.
 
         Raises:
-            InputError: no channel, a channel that the record does not have, a deviation that is not positive.
+            InputError: no channel, a channel that the record does not have, a deviation that is not positive, or of
+                another length.
         """
         if not deviation:
             raise InputError("Name at least one channel to compare, with the standard deviation of its noise.")
         for name, value in deviation.items():
-            positive(f"deviation of channel {name!r}", value, record.units.get(name, ""))
+            _check_deviation(name, value, record)
         return TrajectoryResidual(
             times=record.times,
             reference=reference,
             measured=tuple(record.channel(name) for name in deviation),
-            deviation=tuple(jnp.asarray(float(value)) for value in deviation.values()),
+            deviation=tuple(jnp.asarray(value, dtype=jnp.float64) for value in deviation.values()),
             channels=tuple(deviation),
             stepping=stepping,
         )
@@ -75,6 +78,17 @@ class TrajectoryResidual(AbstractResidual):
             for name, samples, sd in zip(self.channels, self.measured, self.deviation, strict=True)
         ]
         return jnp.concatenate(parts)
+
+
+def _check_deviation(name: str, value: ArrayLike, record: Record) -> None:
+    what = f"deviation of channel {name!r}"
+    samples = record.channel(name).size
+    if np.shape(value) not in ((), (samples,)):
+        raise InputError(
+            f"{what} has shape {np.shape(value)}, but the channel has {samples} samples. Give one number, or one for "
+            "each sample."
+        )
+    positive(what, value, record.units[name])
 
 
 def relative_error_percent(measured: Float[ArrayLike, "measured"], simulated: Float[ArrayLike, "simulated"]) -> float:

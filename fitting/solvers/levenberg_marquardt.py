@@ -11,24 +11,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int, PyTree
 
 from fitting.solvers.dense import bounded_least_squares
-
-
-class Stop(eqx.Enumeration):
-    """Why a solver stopped; `Stop[reason]` is a sentence on what to do."""
-
-    running = "Still running."
-    converged = "Converged: no step of the linearised problem would reduce the cost noticeably."
-    at_precision = (
-        "Converged to the precision of the objective: what is left of the gradient is rounding or integration error."
-    )
-    stalled = (
-        "No step reduces the cost, yet the gradient is not zero. The residual is not smooth, or its derivative is less "
-        "accurate than it should be: tighten the integration tolerance, widen smoothing, or start elsewhere."
-    )
-    not_finite = (
-        "The residual or its Jacobian is not finite at the start. Simulate the start model and look at its status."
-    )
-    too_many_steps = "Out of steps. Raise max_steps, or start closer: the waterfall of a few starts tells which."
+from fitting.solvers.stop import Stop
 
 
 class BoundedState(eqx.Module):

@@ -7,7 +7,7 @@ import pytest
 from jaxtyping import Array, Float
 from scipy import stats
 
-from fitting.fit import fit
+from fitting.fit import FitError, fit
 from fitting.residuals.residual import AbstractResidual, JointResidual
 from fitting.result import FitResult
 from twin._checks import InputError
@@ -152,7 +152,7 @@ def test_residual_that_is_not_finite_is_a_status():
     result = fit(bad, START, SPACE)
     assert not result.success
     assert "not finite at the start" in result.message
-    with pytest.raises(InputError, match="not finite at the start"):
+    with pytest.raises(FitError, match="not finite at the start"):
         fit(bad, START, SPACE, throw=True)
 
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from fitting.fit import result_of, solve_raw
+from fitting.fit import result_of
 from fitting.identification.two_mass import (
     identify_two_mass,
     modes_of,
@@ -18,6 +18,7 @@ from fitting.identification.two_mass import (
 )
 from fitting.identification.two_mass_start import read_two_mass
 from fitting.residuals.frequency_response import FrequencyResponseResidual
+from fitting.solve import solve_raw
 from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt
 from twin._checks import InputError
 from twin.control import DelayedPlant

@@ -144,6 +144,64 @@ def test_a_traced_start_passes():
     assert float(masses(AXIS)[0]) == 95.0
 
 
+TIED = ParameterSpace(
+    [Parameter("low.mass", "kg", tied=("high.mass",)), Parameter("low.offset"), Parameter("high.offset")]
+)
+
+
+def test_tied_paths_take_one_value():
+    models = TIED.with_values({"low": AXIS, "high": AXIS}, jnp.asarray([50.0, 1.0, 2.0]))
+    assert float(models["low"].mass) == float(models["high"].mass) == 50.0
+    assert (float(models["low"].offset), float(models["high"].offset)) == (1.0, 2.0)
+    np.testing.assert_array_equal(TIED.values(models), [50.0, 1.0, 2.0])
+    TIED.check_start(models)
+    assert TIED.paths == ("low.mass", "low.offset", "high.offset")
+
+
+def weighing(value):
+    return ServoAxis(value, CoulombViscousFriction(20.0, 200.0, 1e-3))
+
+
+@given(st.floats(1e-3, 1e6), st.floats(1e-3, 1e6))
+@settings(max_examples=20, deadline=None)
+def test_ties_start_at_one_value(first, second):
+    models = {"low": weighing(first), "high": weighing(second)}
+    if abs(first - second) <= 1e-9 * max(first, second):
+        TIED.check_start(models)
+    else:
+        with pytest.raises(InputError, match=r"low.mass and high.mass are tied, but start at .*with_values"):
+            TIED.check_start(models)
+        TIED.check_start(TIED.with_values(models, TIED.values(models)))
+
+
+def test_a_tie_has_a_gradient_from_every_data_set():
+    models = {"low": AXIS, "high": AXIS}
+
+    def weigh(values):
+        changed = TIED.with_values(models, values)
+        return changed["low"].mass + 10.0 * changed["high"].mass
+
+    np.testing.assert_array_equal(jax.grad(weigh)(TIED.values(models)), [11.0, 0.0, 0.0])
+
+
+def test_ties_read_from_a_file_are_tuples():
+    assert Parameter("a", tied=["b", "c"]) == Parameter("a", tied=("b", "c"))
+    with pytest.raises(InputError, match=r"Write tied=\('high.mass',\)"):
+        Parameter("low.mass", tied="high.mass")
+
+
+def test_an_unknown_tie_names_what_there_is():
+    space = ParameterSpace([Parameter("mass", tied=("weight",))])
+    for use in (lambda: space.check_start(AXIS), lambda: space.with_values(AXIS, jnp.ones(1))):
+        with pytest.raises(InputError, match=r"Unknown parameter path 'weight'.*friction.coulomb"):
+            use()
+
+
+def test_a_tied_path_is_reached_by_its_first():
+    with pytest.raises(InputError, match=r"'high.mass' is tied to 'low.mass'"):
+        TIED["high.mass"]
+
+
 @pytest.mark.parametrize(
     ("make", "said"),
     [
@@ -158,6 +216,11 @@ def test_a_traced_start_passes():
         (lambda: Parameter("mass", prior=(float("nan"), 1.0)), "prior must be"),
         (lambda: ParameterSpace([]), "at least one parameter"),
         (lambda: ParameterSpace([Parameter("mass"), Parameter("mass")]), "'mass' is in the space twice"),
+        (
+            lambda: ParameterSpace([Parameter("mass"), Parameter("gain", tied=("mass",))]),
+            "'mass' is in the space twice",
+        ),
+        (lambda: ParameterSpace([Parameter("mass", tied=("mass",))]), "'mass' is in the space twice"),
     ],
 )
 def test_bad_input_is_named(make, said):

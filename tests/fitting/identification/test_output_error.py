@@ -6,9 +6,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from fitting.fit import result_of, solve_raw
+from fitting.fit import result_of
 from fitting.identification.output_error import output_error
 from fitting.residuals.trajectory import TrajectoryResidual, relative_error_percent
+from fitting.solve import solve_raw
 from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt
 from twin._checks import InputError
 from twin.control import SampledLoop, SampledPositionVelocity

@@ -1,0 +1,1 @@
+"""Published problems with known answers, for the tests of solvers."""

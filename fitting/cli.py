@@ -36,7 +36,7 @@ def _run_small_loops_in_one_piece() -> None:
 
     Takes effect only before JAX starts, and leaves flags that are set already alone.
     """
-    os.environ.setdefault("XLA_FLAGS", "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=65536")
+    os.environ.setdefault("XLA_FLAGS", "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1000000")
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -185,7 +184,12 @@ def check_residual(residual: AbstractResidual, model: Any, space: ParameterSpace
     Raises:
         InputError: naming what is wrong.
     """
-    shape = jax.eval_shape(eqx.filter_jit(residual), model)
+    shape, again = (eqx.filter_eval_shape(lambda m: residual(m), model) for _ in range(2))
+    if shape.shape != again.shape:
+        raise InputError(
+            f"The residual changes its shape from call to call ({shape.shape}, then {again.shape}). Fix which samples "
+            "count before the fit, and weigh by zero what is to be left out."
+        )
     priors = sum(p.prior is not None for p in space.parameters)
     if len(shape.shape) != 1:
         raise InputError(f"A residual must be a vector, but this one has shape {shape.shape}.")

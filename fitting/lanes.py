@@ -22,12 +22,14 @@ from fitting.objective import Objective, cost_of, residual_of
 from fitting.solve import Solved, Solver, options_of, outcome
 from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt, BoundedState
 from fitting.solvers.stop import CONVERGED, STOPS, Stop
+from twin._recursion import tangents_alongside
 
 Combine = Callable[[Objective, Any], Objective]
 Keep = Callable[[float, float], bool]
 
-WIDTH = 64
-"""Lanes of one program: a multiple of every vector length, so that no lane is computed differently from another."""
+WIDTH = 16
+"""Lanes of one program: a multiple of every vector length, so that no lane is computed differently from another, and few
+enough that Jacobians stay in the cache."""
 STRIDE = 4
 """Steps between two looks at which lanes have ended."""
 
@@ -136,7 +138,7 @@ def solve_lanes(
             fresh = np.zeros(width, dtype=bool)
             for slot in np.flatnonzero(~light.running & (numbers >= 0)):
                 number, cost = numbers[slot], float(light.cost[slot])
-                ended.stop[number], ended.steps[number] = _name(light.reason[slot]), light.steps[slot]
+                ended.stop[number], ended.steps[number] = _name(int(light.reason[slot])), light.steps[slot]
                 if ended.stop[number] != "not_finite":
                     ended.vector[number], ended.cost[number] = light.vector[slot], cost
                     ended.active[number] = light.active[slot]
@@ -216,7 +218,8 @@ def _advance(
 
     def one(lane: Task, vector: Array, state: Any) -> tuple[Array, Any]:
         own, function, options = _problem(solver, objective, combine, lane)
-        vector, state, _ = solver.step(function, vector, own, options, state, frozenset())
+        with tangents_alongside():
+            vector, state, _ = solver.step(function, vector, own, options, state, frozenset())
         return vector, state
 
     def running(state: Any) -> Array:
@@ -253,5 +256,5 @@ def _like(mask: Array, leaf: Array) -> Array:
 
 
 def _name(reason: int) -> str:
-    name = {int(getattr(Stop, name)._value): name for name in STOPS}[int(reason)]
+    name = {int(getattr(Stop, name)._value): name for name in STOPS}[reason]
     return "too_many_steps" if name == "running" else name

@@ -1,4 +1,4 @@
-"""Pictures of fits: record against simulation, residual, intervals, correlation. Each takes `ax` and returns it."""
+"""Pictures of a fit: record against simulation, residual, intervals, correlation. Each takes `ax` and returns it."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -6,18 +6,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import ArrayLike
 
+from fitting.plots_axes import axes_or_new
 from fitting.result import FitResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-
-def _axes(ax: "Axes | None") -> "Axes":
-    if ax is not None:
-        return ax
-    from matplotlib import pyplot
-
-    return pyplot.subplots(figsize=(7, 3.2), layout="constrained")[1]
 
 
 def plot_comparison(
@@ -33,7 +26,7 @@ def plot_comparison(
         unit: its unit.
         ax: axes to draw in; new ones if not given.
     """
-    ax = _axes(ax)
+    ax = axes_or_new(ax)
     ax.plot(np.asarray(times), np.asarray(measured), color="0.55", lw=1.6, label="measured")
     ax.plot(np.asarray(times), np.asarray(simulated), color="C0", lw=0.8, label="simulated")
     ax.set_xlabel("time [s]")
@@ -55,7 +48,7 @@ def plot_residual(
         ylabel: name and unit of the residual.
         ax: axes to draw in; new ones if not given.
     """
-    ax = _axes(ax)
+    ax = axes_or_new(ax)
     for i, (name, values) in enumerate(residual.items()):
         ax.plot(np.asarray(x), np.asarray(values), ".", ms=1.0, color=f"C{i}", alpha=0.6, label=name, rasterized=True)
     ax.axhline(0, color="0.3", lw=0.6)
@@ -71,47 +64,78 @@ def plot_intervals(
 ) -> "Axes":
     """Confidence intervals relative to the estimates, and the true values where they are known.
 
+    A parameter without an interval is marked, and its name says why: it sits on a bound (a triangle that points against
+    the bound), or the data do not determine it (a hollow circle). Estimates of zero have no relative deviation; theirs
+    is in the parameter's own unit, a hundredth of which is one per cent.
+
     Args:
         result: fit.
-        truth: true values in SI by path.
+        truth: true values in SI by path; parameters that it leaves out get no mark.
         level: confidence.
         ax: axes to draw in; new ones if not given.
     """
-    ax = _axes(ax)
-    rows = np.arange(len(result.space))
+    count = len(result.space)
+    ax = axes_or_new(ax, (7.0, 1.4 + 0.3 * max(count, 6)))
+    rows = np.arange(count)
     size = np.where(result.values == 0, 1.0, np.abs(result.values))
     low, high = 100 * (result.intervals(level).T - result.values) / size
-    ax.hlines(rows, low, high, color="C0", lw=2.5, label=f"{100 * level:g} % interval")
-    ax.plot(np.zeros_like(rows), rows, "o", color="C0", ms=4, label="estimate")
+    known, held = np.isfinite(low) & np.isfinite(high), np.asarray(result.active)
+    ax.hlines(rows[known], low[known], high[known], color="C0", lw=2.5, label=f"{100 * level:g} % interval")
+    ax.plot(np.zeros(known.sum()), rows[known], "o", color="C0", ms=4, label="estimate")
+    lower = np.asarray([np.isclose(v, p.lower) for v, p in zip(result.values, result.space.parameters, strict=True)])
+    for mask, marker, label in (
+        (held & lower, "<", "at the lower bound"),
+        (held & ~lower, ">", "at the upper bound"),
+        (~held & ~known, "o", "no interval"),
+    ):
+        if mask.any():
+            ax.plot(np.zeros(mask.sum()), rows[mask], marker, color="C1", mfc="none", mew=1.6, ms=7, label=label)
     if truth is not None:
-        off = [100 * (truth[path] - v) / s for path, v, s in zip(result.space.paths, result.values, size, strict=True)]
-        ax.plot(off, rows, "x", color="C3", ms=7, mew=1.8, label="true value")
-    ax.set_yticks(rows, result.space.paths)
-    ax.invert_yaxis()
-    ax.margins(y=0.15)
+        named = [i for i, path in enumerate(result.space.paths) if path in truth]
+        off = [100 * (truth[result.space.paths[i]] - result.values[i]) / size[i] for i in named]
+        ax.plot(off, named, "x", color="C3", ms=7, mew=1.8, label="true value")
+    ax.axvline(0, color="0.8", lw=0.8, zorder=0)
+    ax.set_yticks(rows, [_name_and_remark(result, i, bool(lower[i])) for i in range(count)])
+    ax.set_ylim(count - 0.5, -0.5)
+    ax.margins(x=0.08)
     ax.set_xlabel("deviation from the estimate [%]")
-    ax.legend(loc="best")
+    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize="small")
     return ax
 
 
 def plot_correlation(result: FitResult, *, ax: "Axes | None" = None) -> "Axes":
-    """Correlation of the estimates as a heat map.
+    """Correlation of the estimates as a heat map with its numbers; a cross where there is none to give.
 
     Args:
         result: fit.
         ax: axes to draw in; new ones if not given.
     """
-    from matplotlib import pyplot
-
-    if ax is None:
-        side = 2.2 + 0.4 * len(result.space)
-        ax = pyplot.subplots(figsize=(side + 1, side), layout="constrained")[1]
-    image = ax.imshow(result.correlation, vmin=-1, vmax=1, cmap="RdBu_r")
-    rows = np.arange(len(result.space))
-    ax.set_xticks(rows, result.space.paths, rotation=45, ha="right")
+    count = len(result.space)
+    words = 0.08 * max(len(path) for path in result.space.paths)
+    ax = axes_or_new(ax, (1.8 + words + 0.55 * count, 0.6 + 0.75 * words + 0.55 * count))
+    correlation = np.asarray(result.correlation)
+    image = ax.imshow(correlation, vmin=-1, vmax=1, cmap="RdBu_r")
+    rows = np.arange(count)
+    small = "small" if count <= 10 else 6
+    for i in range(count):
+        for j in range(count):
+            value = correlation[i, j]
+            text = f"{value:.2f}".replace("-", "−") if np.isfinite(value) else "×"
+            ax.text(j, i, text, ha="center", va="center", fontsize=small, color="w" if abs(value) > 0.6 else "k")
+    ax.set_xticks(rows, result.space.paths, rotation=45, ha="right", rotation_mode="anchor")
     ax.set_yticks(rows, result.space.paths)
+    ax.set_facecolor("0.9")
     ax.figure.colorbar(image, ax=ax, label="correlation [-]", shrink=0.8)
     return ax
+
+
+def _name_and_remark(result: FitResult, i: int, lower: bool) -> str:
+    path = result.space.paths[i]
+    if result.active[i]:
+        return f"{path}\n(at its {'lower' if lower else 'upper'} bound)"
+    if result.unseen[i]:
+        return f"{path}\n(not determined)"
+    return path
 
 
 def save_figure(figure: Any, path: Any) -> None:

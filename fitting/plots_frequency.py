@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
+from fitting.plots_axes import axes_or_new
 from twin._checks import InputError
 from twin.frf import FRF
 
@@ -37,7 +38,7 @@ def plot_magnitude(
     Returns:
         The axes.
     """
-    ax = _axes(ax)
+    ax = axes_or_new(ax, (6.4, 4.8))
     ax.plot(measured.frequency, np.abs(measured[response, excitation]), label="measured", **_MEASURED)
     if model is not None:
         ax.plot(model.frequency, np.abs(model[response, excitation]), label="model", **_MODEL)
@@ -65,7 +66,7 @@ def plot_phase(
     Returns:
         The axes.
     """
-    ax = _axes(ax)
+    ax = axes_or_new(ax, (6.4, 4.8))
     phase = np.unwrap(np.angle(np.asarray(measured[response, excitation])))
     smooth = None
     if model is not None:
@@ -108,7 +109,7 @@ def plot_log_error(
         raise InputError(f"error has shape {size.shape}, but frequency has {f.shape}. Give one error for each line.")
     from matplotlib.ticker import FuncFormatter
 
-    ax = _axes(ax)
+    ax = axes_or_new(ax, (6.4, 4.8))
     ax.plot(f, size, label="|ln(model / measured)|", zorder=5, **{**_MEASURED, "markersize": 4.5, "color": "k"})
     for number, (label, level) in enumerate((scatter or {}).items()):
         color = f"C{number}"
@@ -123,14 +124,6 @@ def plot_log_error(
     ax.grid(True, which="major", alpha=0.3)
     ax.legend(fontsize="small")
     return ax
-
-
-def _axes(ax: "Axes | None") -> "Axes":
-    if ax is not None:
-        return ax
-    from matplotlib import pyplot
-
-    return pyplot.subplots()[1]
 
 
 def _frequency_axis(ax: "Axes", measured: FRF) -> None:

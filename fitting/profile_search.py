@@ -1,7 +1,5 @@
 """The search for the ends of profile intervals: all parameters and both sides move on as one batch."""
 
-from typing import Any
-
 import numpy as np
 
 from fitting.lanes import Task, solve_lanes
@@ -27,7 +25,8 @@ class Side:
         at = int(np.searchsorted(self.shifts, shift))
         self.shifts.insert(at, shift)
         self.ratios.insert(at, ratio)
-        self.vectors.insert(at, vector)
+        # The estimate itself, at shift 0, has no entry here.
+        self.vectors.insert(at - 1, vector)
 
     def end(self, critical: float) -> float | None:
         """Shift at which the ratio first crosses the critical value, between the points known."""
@@ -137,7 +136,7 @@ class ProfileSearch:
         below, above = (side for side in self.sides if side.index == index)
         return below, above
 
-    def _guess(self, side: Side, shift: float) -> np.ndarray[Any, Any]:
+    def _guess(self, side: Side, shift: float) -> np.ndarray:
         """Where the other parameters will be: on the line through the two nearest points, else by linear theory."""
         best, i = self.result.scaled, side.index
         shifts = np.asarray(side.shifts)

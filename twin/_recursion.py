@@ -1,12 +1,27 @@
-"""Recursions x[k+1] = f(θ, x[k], u[k]) whose derivative is computed for all steps at once."""
+"""Recursions x[k+1] = f(θ, x[k], u[k]), and two ways to differentiate them.
 
-from collections.abc import Callable
+Alongside: JAX's own rule for a scan, which carries the tangents with the state. It is the fastest where the compiler
+turns the loop into one function (see `LOOP_OPTION`), and in batches.
+
+Afterwards: without that option every operation of a loop is a call of its own, which costs more than the arithmetic of
+a feed drive. The states are then found first, and all steps are linearised together.
+"""
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, PyTree
+
+LOOP_OPTION = "xla_cpu_small_while_loop_byte_threshold"
+"""Option of the CPU compiler: loops whose state is smaller than this many bytes become one function."""
+
+_in_batch: ContextVar[bool] = ContextVar("in_batch", default=False)
 
 # Steps linearised together: enough to fill vector units, few enough that intermediate results stay in cache.
 _CHUNK = 256
@@ -18,11 +33,7 @@ def run_recursion(
     start: Float[Array, " n"],
     items: PyTree[Array],
 ) -> tuple[Float[Array, "steps n"], Float[Array, " n"], Array]:
-    """All states of a recursion.
-
-    Differentiating a scan runs the tangents through its steps one by one. Here the states are found first; then all
-    steps are linearised together, x'[k+1] = A[k]·x'[k] + b[k], which leaves only tiny matrix products to the
-    recursion. The rule is linear in the tangents, so forward and reverse mode both work.
+    """All states of a recursion; forward and reverse mode both work.
 
     Args:
         step: function of (parameters, state, item) that returns the next state, and something that is not
@@ -35,15 +46,20 @@ def run_recursion(
         The states before each step, the state after the last one, and what else the steps returned, stacked.
     """
 
-    @jax.custom_jvp
-    def run(parameters: PyTree[Array], start: Array, items: PyTree[Array]) -> tuple[Array, Array, Array]:
+    def plain(parameters: PyTree[Array], start: Array, items: PyTree[Array]) -> tuple[Array, Array, Array]:
         def body(x: Array, item: PyTree[Array]) -> tuple[Array, tuple[Array, Array]]:
             after, extra = step(parameters, x, item)
-            return after, (x, extra)
+            return after, (x, jax.lax.stop_gradient(extra))
 
         last, (states, extras) = jax.lax.scan(body, start, items)
         return states, last, extras
 
+    if _in_batch.get() or (LOOP_OPTION in os.environ.get("XLA_FLAGS", "") and jax.default_backend() == "cpu"):
+        return plain(parameters, start, items)
+
+    run = jax.custom_jvp(plain)
+
+    # All steps at once: x'[k+1] = A[k]·x'[k] + b[k] leaves only tiny matrix products to the recursion.
     @run.defjvp
     def run_jvp(primals: Any, tangents: Any) -> Any:
         parameters, start, items = primals
@@ -67,6 +83,16 @@ def run_recursion(
         return (states, last, extras), (d_states, d_last, jnp.zeros_like(extras))
 
     return run(parameters, start, items)
+
+
+@contextlib.contextmanager
+def tangents_alongside() -> Iterator[None]:
+    """While a function is traced that will run as a batch: recursions are differentiated alongside."""
+    token = _in_batch.set(True)
+    try:
+        yield
+    finally:
+        _in_batch.reset(token)
 
 
 def _map_in_chunks(function: Callable, items: PyTree[Array]) -> PyTree[Array]:

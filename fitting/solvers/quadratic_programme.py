@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from fitting.solvers.factor import inverse_of_lower, solve_upper
+from fitting.solvers.factor import inverse_of_lower
 
 
 class QuadraticSolution(NamedTuple):
@@ -25,7 +25,7 @@ class QuadraticSolution(NamedTuple):
 class _State(NamedTuple):
     step: Float[Array, "n"]
     reach: Float[Array, "n"]
-    """Largest size of each variable so far."""
+    """Size of what the step is summed up from, which its rounding is relative to."""
     dual: Float[Array, "n"]
     """Multipliers of the active constraints, by slot."""
     active: Int[Array, "n"]
@@ -36,8 +36,8 @@ class _State(NamedTuple):
     """Active constraints."""
     basis: Float[Array, "n n"]
     """J with J·Jᵀ = B⁻¹; its first columns span the active normals in the metric of B."""
-    triangle: Float[Array, "n n"]
-    """R of the active normals: Jᵀ·N = [R; 0]."""
+    inverse: Float[Array, "n n"]
+    """W with W·Jᵀ·N = I for the active normals N: one row a slot, zero beyond `filled`."""
     entering: Int[Array, ""]
     """Constraint that is being added; -1 between two."""
     entering_dual: Float[Array, ""]
@@ -89,15 +89,22 @@ def quadratic_programme(
     size = jnp.sqrt(jnp.sum(all_normals[:rows] ** 2, axis=1))
     size = jnp.where(size > 0, size, 1.0)
     offsets = jnp.concatenate([values, -lower, upper])
+    all_offsets = jnp.append(offsets, 0.0)
     number = jnp.arange(rows)
 
     def body(state: _State) -> _State:
-        slack = all_normals[:rows] @ state.step + offsets
-        # The free minimum can be far away, and its rounding stays in every later step.
-        rounding = 1e-14 * (jnp.abs(all_normals[:rows]) @ state.reach + jnp.abs(offsets)) + 1e-300
+        fresh = state.entering < 0
+        inside = slot < state.filled
+        # Between two constraints the step follows from the active ones alone. Summed up instead, it would keep the
+        # rounding of a free minimum that can be very far away.
+        target = jnp.where(inside, -state.sign * all_offsets[state.active], 0.0)
+        part = jnp.where(inside, target @ state.inverse, -(gradient @ state.basis))
+        step = jnp.where(fresh, state.basis @ part, state.step)
+        reach = jnp.where(fresh, jnp.abs(state.basis) @ jnp.abs(part), state.reach)
+        slack = all_normals[:rows] @ step + offsets
+        rounding = 1e-14 * (jnp.abs(all_normals[:rows]) @ reach + jnp.abs(offsets)) + 1e-300
 
         # Choose: the equalities one by one, then the inequality violated most.
-        fresh = state.entering < 0
         is_active = jnp.any(state.active[None, :] == number[:, None], axis=1)
         violation = jnp.where((number >= equalities) & ~is_active, -slack / size, -jnp.inf)
         violation = jnp.where(-slack > rounding, violation, -jnp.inf)
@@ -111,13 +118,11 @@ def quadratic_programme(
         normal = sign * all_normals[p]
         miss = sign * slack[p]
         image = state.basis.T @ normal
-        inside = slot < state.filled
         rest = jnp.where(inside, 0.0, image)
         curvature = jnp.sum(rest**2)
         dependent = curvature <= 1e-24 * jnp.sum(image**2)
         direction = state.basis @ rest
-        triangle = jnp.where(inside[:, None] & inside[None, :], state.triangle, eye)
-        change = solve_upper(triangle, jnp.where(inside, image, 0.0))
+        change = state.inverse @ image
 
         may_leave = inside & (state.active >= equalities) & (change > 0)
         ratio = jnp.where(may_leave, state.dual / jnp.where(may_leave, change, 1.0), jnp.inf)
@@ -132,17 +137,16 @@ def quadratic_programme(
         length = jnp.where(moves, length, 0.0)
         adds = moves & (full_length <= dual_length)
         drops = moves & ~adds
-        step = state.step + jnp.where(dependent, 0.0, length) * direction
+        step = step + jnp.where(dependent, 0.0, length) * direction
         duals = jnp.where(inside, state.dual - length * change, 0.0)
         dual = dual + length
 
-        added_basis, column = _reflect(state.basis, image, state.filled)
+        basis, inverse = _updated(state, image, change, leaving, adds, drops)
         last = slot == state.filled
-        dropped_basis, dropped_triangle = _drop(state.basis, state.triangle, leaving, state.filled)
         behind = jnp.where(slot >= leaving, 1, 0)
         following = jnp.minimum(slot + behind, n - 1)
 
-        def shifted(values: Array, empty: Array | float) -> Array:
+        def shifted(values: Array, empty: float | int) -> Array:
             return jnp.where(slot + 1 >= state.filled, jnp.where(behind == 1, empty, values), values[following])
 
         def pick(add: Array, drop: Array, keep: Array) -> Array:
@@ -151,13 +155,13 @@ def quadratic_programme(
         settled = nothing | stuck
         return _State(
             step=step,
-            reach=jnp.maximum(state.reach, jnp.abs(step)),
+            reach=jnp.maximum(reach, jnp.abs(step)),
             dual=pick(jnp.where(last, dual, duals), shifted(duals, 0.0), duals),
             active=pick(jnp.where(last, p, state.active), shifted(state.active, rows), state.active),
             sign=pick(jnp.where(last, sign, state.sign), shifted(state.sign, 1.0), state.sign),
             filled=state.filled + jnp.where(adds, 1, 0) - jnp.where(drops, 1, 0),
-            basis=pick(added_basis, dropped_basis, state.basis),
-            triangle=pick(jnp.where(last[None, :], column[:, None], state.triangle), dropped_triangle, state.triangle),
+            basis=basis,
+            inverse=inverse,
             entering=jnp.where(drops, p, -1),
             entering_dual=dual,
             entering_sign=sign,
@@ -177,7 +181,7 @@ def quadratic_programme(
         sign=jnp.ones(n),
         filled=jnp.asarray(0),
         basis=basis,
-        triangle=eye,
+        inverse=jnp.zeros((n, n)),
         entering=jnp.asarray(-1),
         entering_dual=zero,
         entering_sign=zero + 1.0,
@@ -187,7 +191,7 @@ def quadratic_programme(
         turns=jnp.asarray(0),
     )
     end = jax.lax.while_loop(lambda s: ~s.done & (s.turns < limit), body, start)
-    step, dual = _refined(end, gradient, all_normals, jnp.append(offsets, 0.0))
+    step, dual = _refined(end, gradient, all_normals, all_offsets)
     every = jnp.zeros(rows + 1).at[end.active].add(end.sign * dual)
     return QuadraticSolution(
         step=jnp.where(skip, 0.0, jnp.clip(step, lower, upper)),
@@ -197,52 +201,53 @@ def quadratic_programme(
     )
 
 
+def _updated(
+    state: _State, image: Array, change: Array, leaving: Array, adds: Array, drops: Array
+) -> tuple[Array, Array]:
+    """J and W after a constraint joined, left, or neither.
+
+    One reflection does either: it turns what the new normal has beyond the active ones onto the next axis, or the
+    leaving constraint's row of W, which is at right angles to all other active normals, onto the last one.
+    """
+    slot = jnp.arange(image.size)
+    row = state.inverse[leaving]
+    vector = jnp.where(drops, row, jnp.where(slot >= state.filled, image, 0.0))
+    axis = slot == state.filled - jnp.where(drops, 1, 0)
+    largest = jnp.max(jnp.abs(vector))
+    vector = vector / jnp.where(largest > 0, largest, 1.0)
+    head, norm = jnp.sum(jnp.where(axis, vector, 0.0)), jnp.sqrt(jnp.sum(vector**2))
+    turned = jnp.where(head >= 0, -norm, norm)
+    vector = vector - jnp.where(axis, turned, 0.0)
+    square = jnp.sum(vector**2)
+    usable = (adds | drops) & (square > 0)
+    scale = jnp.where(usable, 2.0 / jnp.where(usable, square, 1.0), 0.0)
+    both = jnp.concatenate([state.basis, state.inverse])
+    both = both - scale * jnp.outer(both @ vector, vector)
+    basis, inverse = both[: image.size], both[image.size :]
+    length = jnp.where(adds, turned * largest, 1.0)
+    joined = inverse + jnp.outer(jnp.where(axis, 1.0, -change), jnp.where(axis, 1.0 / length, 0.0))
+    above = jnp.where(slot[:, None] >= leaving, jnp.roll(inverse, -1, axis=0), inverse)
+    left = jnp.where((slot[:, None] + 1 < state.filled) & ~axis, above, 0.0)
+    return basis, jnp.where(adds, joined, jnp.where(drops, left, inverse))
+
+
 def _refined(end: _State, gradient: Array, normals: Array, offsets: Array) -> tuple[Array, Array]:
     """Step and multipliers straight from the active set: the path's rounding is left behind."""
-    n = gradient.size
-    inside = jnp.arange(n) < end.filled
-    triangle = jnp.where(inside[:, None] & inside[None, :], end.triangle, jnp.eye(n))
+    inside = jnp.arange(gradient.size) < end.filled
+    # Jᵀ·N, whose inverse is known up to the rounding of many updates.
+    active = end.basis.T @ (end.sign[:, None] * normals[end.active]).T
+    active = jnp.where(inside[:, None] & inside[None, :], active, 0.0)
+
+    def solved(matrix: Array, inverse: Array, target: Array) -> Array:
+        x = inverse @ target
+        for _ in range(2):
+            x = x + inverse @ (target - matrix @ x)
+        return x
+
     target = jnp.where(inside, -offsets[end.active] * end.sign, 0.0)
-    along = jnp.where(inside, solve_upper(triangle.T[::-1, ::-1], target[::-1])[::-1], 0.0)
+    along = solved(active.T, end.inverse.T, target)
     pull = end.basis.T @ gradient
     step = end.basis @ jnp.where(inside, along, -pull)
-    dual = jnp.where(inside, solve_upper(triangle, jnp.where(inside, along + pull, 0.0)), 0.0)
+    dual = solved(active, end.inverse, jnp.where(inside, along + pull, 0.0))
     # An inequality that pushes by rounding alone does not push.
     return step, jnp.where(end.dual == 0, jnp.maximum(dual, 0.0), dual)
-
-
-def _reflect(basis: Array, image: Array, count: Array) -> tuple[Array, Array]:
-    """J after the reflection that turns the part of Jᵀn beyond `count` onto one axis, and Jᵀn after it."""
-    slot = jnp.arange(image.size)
-    below = jnp.where(slot >= count, image, 0.0)
-    head = jnp.sum(jnp.where(slot == count, image, 0.0))
-    norm = jnp.sqrt(jnp.sum(below**2))
-    turned = jnp.where(head >= 0, -norm, norm)
-    vector = below - jnp.where(slot == count, turned, 0.0)
-    square = jnp.sum(vector**2)
-    scale = jnp.where(square > 0, 2.0 / jnp.where(square > 0, square, 1.0), 0.0)
-    column = jnp.where(slot < count, image, jnp.where(slot == count, turned, 0.0))
-    return basis - scale * jnp.outer(basis @ vector, vector), column
-
-
-def _drop(basis: Array, triangle: Array, leaving: Array, count: Array) -> tuple[Array, Array]:
-    """J and R without the active constraint in one slot: rotations chase the subdiagonal away."""
-    n = triangle.shape[0]
-    column = jnp.arange(n)
-    shifted = jnp.where(column[None, :] >= leaving, jnp.roll(triangle, -1, axis=1), triangle)
-
-    def rotate(k: Array, carry: tuple[Array, Array]) -> tuple[Array, Array]:
-        r, q = carry
-        a, b = r[k, k], r[k + 1, k]
-        length = jnp.hypot(a, b)
-        needed = (k >= leaving) & (k < count - 1) & (length > 0)
-        c = jnp.where(needed, a / jnp.where(needed, length, 1.0), 1.0)
-        s = jnp.where(needed, b / jnp.where(needed, length, 1.0), 0.0)
-        upper_row, lower_row = r[k], r[k + 1]
-        r = r.at[k].set(c * upper_row + s * lower_row).at[k + 1].set(c * lower_row - s * upper_row)
-        left, right = q[:, k], q[:, k + 1]
-        q = q.at[:, k].set(c * left + s * right).at[:, k + 1].set(c * right - s * left)
-        return r, q
-
-    new_triangle, new_basis = jax.lax.fori_loop(0, n - 1, rotate, (shifted, basis))
-    return new_basis, new_triangle

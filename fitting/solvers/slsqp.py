@@ -95,7 +95,7 @@ class SLSQP(optx.AbstractMinimiser):
         # The start is evaluated by the first call of `step`: an objective is then compiled once, not twice.
         return SLSQPState(
             here=Evaluation(zero, jnp.zeros(n), jnp.zeros(m), jnp.zeros((m, n))),
-            factor=_first_factor(options, n),
+            factor=jnp.eye(n),
             direction=jnp.zeros(n),
             length=zero,
             slope=zero,
@@ -127,7 +127,7 @@ class SLSQP(optx.AbstractMinimiser):
         start = jnp.clip(flat, lower, upper)
         trial = jnp.where(first, start, jnp.clip(flat + state.length * state.direction, lower, upper))
 
-        def evaluate(point: Array) -> tuple[Array, tuple[Array, PyTree]]:
+        def evaluate(point: Array) -> tuple[Array, PyTree]:
             value, aux = fn(unravel(point), args)
             return jnp.concatenate([jnp.reshape(value, (1,)), _constraints(options, unravel(point), args)]), aux
 
@@ -166,9 +166,9 @@ class SLSQP(optx.AbstractMinimiser):
         # A line search that fails on a B with history is tried again without it.
         small = jnp.all(jnp.abs(state.length * state.direction) <= 4e-16 * jnp.abs(flat) + 1e-300)
         uphill = state.slope >= 0
-        failed = ~accept & ~first & (small | uphill | (state.trials >= 20))
+        failed = ~first & (small | (~accept & (uphill | (state.trials >= 20))))
         again = failed & ~state.fresh
-        factor = jnp.where(again, _first_factor(options, flat.size), factor)
+        factor = jnp.where(again | (first & accept), _first_factor(options, here.gradient, point), factor)
         plan = plan_direction(
             here,
             factor,
@@ -270,13 +270,17 @@ def _sizes(options: dict, y: PyTree, args: PyTree) -> tuple[int, int]:
     sizes = []
     for name in ("equality", "inequality"):
         function = options.get(name)
-        sizes.append(0 if function is None else int(jax.eval_shape(function, y, args).size))
+        sizes.append(0 if function is None else int(eqx.filter_eval_shape(function, y, args).size))
     return sizes[0], sizes[1]
 
 
-def _first_factor(options: dict, n: int) -> Array:
-    factor = options.get("factor")
-    return jnp.eye(n) if factor is None else jnp.asarray(factor)
+def _first_factor(options: dict, gradient: Array, point: Array) -> Array:
+    """L before anything is known of the curvature."""
+    if options.get("factor") is not None:
+        return jnp.asarray(options["factor"])
+    # One, but where the unknowns are large or f is flat that would make steps, and promises, of next to nothing.
+    relative = jnp.max(jnp.abs(gradient)) / jnp.maximum(1.0, jnp.max(jnp.abs(point)))
+    return jnp.sqrt(jnp.clip(relative, 1e-20, 1.0)) * jnp.eye(gradient.size)
 
 
 def _bounds(options: dict, flat: Float[Array, "variables"]) -> tuple[Array, Array]:

@@ -1,44 +1,70 @@
 """Run all benchmarks: `python -m tests.benchmarks.run --out DIR`.
 
-Writes `benchmarks.json` and `benchmarks.md` into the folder and prints the latter. Needs CasADi, which comes with the
-`bench` extra. Takes some minutes on two cores; `--short` leaves out the whole record.
+Writes `benchmarks.json` and `benchmarks.md` into the folder and prints the latter. Needs CasADi and pyswarms, which
+come with the `bench` extra. Takes some minutes on two cores; `--short` leaves out the whole record, `--sections`
+chooses.
 """
 
 import argparse
 import json
+import os
 from pathlib import Path
 
 import jax
 
+SECTIONS = ("simulation", "programmes", "multistart", "swarm")
+
 
 def main() -> None:
     """Run, print, write."""
-    parser = argparse.ArgumentParser(description="Speed of the twin against SciPy and CasADi, as ratios in one run.")
+    parser = argparse.ArgumentParser(description="The twin against SciPy and CasADi, as ratios in one run.")
     parser.add_argument("--out", type=Path, required=True, help="folder for benchmarks.json and benchmarks.md")
     parser.add_argument("--ticks", type=int, default=2000, help="length of the stretch on which all entrants run")
     parser.add_argument("--rounds", type=int, default=2, help="turns of timing")
     parser.add_argument("--short", action="store_true", help="leave out the whole record")
+    parser.add_argument("--sections", nargs="+", choices=SECTIONS, default=SECTIONS, help="what to run")
+    parser.add_argument("--starts", type=int, default=1000, help="starts of the nonlinear programmes")
     options = parser.parse_args()
 
+    # As the command line does; before the first array is made.
+    os.environ.setdefault("XLA_FLAGS", "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1000000")
     jax.config.update("jax_enable_x64", True)
     # Imported late: these modules make arrays.
+    from tests.benchmarks import multistart, programmes, swarm
     from tests.benchmarks.emps_case import dahl_case, rigid_case
     from tests.benchmarks.emps_simulation import compare, compare_best
     from tests.benchmarks.report import as_dictionary, as_markdown, machine
 
-    rigid = rigid_case()
-    stretch = compare(rigid.first(options.ticks), rounds=options.rounds)
-    comparisons = [stretch, compare(dahl_case().first(options.ticks), rounds=options.rounds)]
-    if not options.short:
-        comparisons.insert(0, compare_best(rigid, stretch, rounds=options.rounds))
+    comparisons = []
+    text, results = "", {}
+    if "simulation" in options.sections:
+        rigid = rigid_case()
+        stretch = compare(rigid.first(options.ticks), rounds=options.rounds)
+        comparisons = [stretch, compare(dahl_case().first(options.ticks), rounds=options.rounds)]
+        if not options.short:
+            comparisons.insert(0, compare_best(rigid, stretch, rounds=options.rounds))
+        results["emps_simulation"] = [as_dictionary(c) for c in comparisons]
+    if "programmes" in options.sections:
+        found = programmes.counts()
+        speeds = programmes.throughputs(options.starts, options.rounds)
+        text = programmes.as_markdown(found, speeds) + "\n"
+        results["nonlinear_programmes"] = programmes.as_dictionary(found, speeds)
+
+    if "multistart" in options.sections:
+        rows = multistart.multistart_speeds()
+        text += multistart.as_markdown(rows) + "\n"
+        results["multistart"] = multistart.as_dictionary(rows)
+    if "swarm" in options.sections:
+        ledger = swarm.swarm_ledger()
+        text += swarm.as_markdown(ledger) + "\n"
+        results["swarm"] = swarm.as_dictionary(ledger)
 
     about = machine()
-    text = as_markdown(comparisons, about)
+    text = as_markdown(comparisons, about).replace("## Machine", text + "## Machine")
     print(text)
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "benchmarks.md").write_text(text, encoding="utf-8")
-    results = {"machine": about, "emps_simulation": [as_dictionary(c) for c in comparisons]}
-    (options.out / "benchmarks.json").write_text(json.dumps(results, indent=2), encoding="utf-8")
+    (options.out / "benchmarks.json").write_text(json.dumps({"machine": about, **results}, indent=2), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -8,10 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from fitting.solvers.dense import bounded_least_squares, least_squares_solve
+from fitting.solvers.dense import bounded_least_squares, least_squares_solve, orthogonal_triangle
 
 ROWS, COLUMNS = 8, 5
 _solve = jax.jit(least_squares_solve)
+_triangle = jax.jit(orthogonal_triangle)
 _bounded = jax.jit(bounded_least_squares)
 _seeds = st.integers(0, 2**32 - 1)
 
@@ -106,3 +107,41 @@ def test_a_batch_equals_its_members():
         alone = _bounded(matrices[i], targets[i], damping[i], -bound[i], bound[i])
         np.testing.assert_allclose(together[0][i], alone[0], rtol=1e-9, atol=1e-12)
         np.testing.assert_array_equal(together[1][i], alone[1])
+
+
+@given(_seeds)
+@settings(max_examples=100, deadline=None)
+def test_triangle_like_lapack(seed):
+    """Up to the signs of the rows, of columns that differ by many decades."""
+    random = np.random.default_rng(seed)
+    matrix = random.standard_normal((40, 6)) * 10.0 ** random.uniform(-80, 80, 6)
+    vector = random.standard_normal(40)
+    triangle, projected = (np.asarray(part) for part in _triangle(matrix, vector))
+    norms = np.linalg.norm(matrix, axis=0)
+    expected = np.linalg.qr(np.column_stack([matrix / norms, vector]), mode="r")
+    signs = np.sign(np.diag(expected)[:6])
+    np.testing.assert_allclose(triangle / norms, signs[:, None] * expected[:6, :6], atol=1e-13)
+    np.testing.assert_allclose(projected, signs * expected[:6, 6], atol=1e-12)
+
+
+@pytest.mark.parametrize("condition", [1e3, 1e6, 1e9, 1e12])
+def test_trap_28_triangle_keeps_the_smallest_singular_value(condition):
+    random = np.random.default_rng(1)
+    left, right = (np.linalg.qr(random.standard_normal(shape))[0] for shape in ((300, 7), (7, 7)))
+    matrix = left * np.geomspace(1.0, 1 / condition, 7) @ right
+    singular = np.linalg.svd(np.asarray(_triangle(matrix, np.ones(300))[0]))[1]
+    # What rounding of the matrix itself does to it.
+    np.testing.assert_allclose(singular[-1] * condition, 1.0, atol=100 * condition * np.finfo(float).eps)
+
+
+@pytest.mark.parametrize("rows", [3, 6, 50])
+def test_trap_28_triangle_of_columns_that_hang_together(rows):
+    random = np.random.default_rng(rows)
+    matrix = random.standard_normal((rows, 6))
+    matrix[:, 1], matrix[:, 4] = 0.0, matrix[:, 0] - 2 * matrix[:, 2]
+    triangle, projected = (np.asarray(part) for part in _triangle(matrix, np.ones(rows)))
+    rank = np.linalg.matrix_rank(matrix)
+    np.testing.assert_array_equal(np.sum(np.diag(triangle) > 0), rank)
+    np.testing.assert_allclose(triangle.T @ triangle, matrix.T @ matrix, atol=1e-12)
+    np.testing.assert_allclose(triangle.T @ projected, matrix.T @ np.ones(rows), atol=1e-11)
+    np.testing.assert_array_equal(projected[np.diag(triangle) == 0], 0.0)

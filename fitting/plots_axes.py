@@ -1,0 +1,107 @@
+"""What the plots of this room share: new axes, grids of them, and labels of parameters."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from twin._checks import InputError
+from twin.parameters import Parameter
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def axes_or_new(ax: "Axes | None", size: tuple[float, float] = (7.0, 3.2)) -> "Axes":
+    """The axes given, or those of a new figure.
+
+    Args:
+        ax: axes, or None.
+        size: width and height of a new figure [inch].
+    """
+    if ax is not None:
+        return ax
+    from matplotlib import pyplot
+
+    return pyplot.subplots(figsize=size, layout="constrained")[1]
+
+
+def grid_or_new(
+    axes: "Sequence[Axes] | np.ndarray | None", count: int, *, columns: int = 3, panel: tuple[float, float] = (3.4, 2.6)
+) -> "np.ndarray":
+    """As many axes as asked for: those given, or a grid of a new figure.
+
+    Args:
+        axes: axes, or None.
+        count: panels needed.
+        columns: most panels in a row.
+        panel: width and height of one panel of several [inch].
+
+    Returns:
+        Axes (count,).
+
+    Raises:
+        InputError: another number of axes than panels.
+    """
+    if axes is not None:
+        given = np.asarray(axes, dtype=object).ravel()
+        if given.size != count:
+            raise InputError(f"axes holds {given.size} axes, but {count} are drawn. Give as many, or none.")
+        return given
+    from matplotlib import pyplot
+
+    wide = min(count, columns)
+    high = -(-count // wide)
+    size = (wide * panel[0], high * panel[1]) if count > 1 else (5.0, 3.6)
+    grid = pyplot.subplots(high, wide, figsize=size, layout="constrained", squeeze=False)[1].ravel()
+    for unused in grid[count:]:
+        unused.remove()
+    return grid[:count]
+
+
+def label_of(parameter: Parameter) -> str:
+    """Name and unit of a parameter.
+
+    Args:
+        parameter: a free parameter.
+    """
+    return f"{parameter.path} [{parameter.unit}]" if parameter.unit else parameter.path
+
+
+def is_wide(parameter: Parameter, values: np.ndarray) -> bool:
+    """Whether a parameter is on a log scale and its values span more than a decade.
+
+    Args:
+        parameter: the parameter.
+        values: what is drawn of it, SI.
+    """
+    finite = values[np.isfinite(values)]
+    return bool(parameter.scale == "log" and finite.size and 0 < 10 * finite.min() < finite.max())
+
+
+def add_shared_legend(grid: np.ndarray, columns: int) -> None:
+    """One legend for all panels of a figure, below them.
+
+    Args:
+        grid: panels that show the same things; the first one's labels are used.
+        columns: columns of the legend; two at most under a single panel.
+    """
+    handles, labels = grid[0].get_legend_handles_labels()
+    columns = columns if len(grid) > 1 else 2
+    grid[0].figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize="small")
+
+
+def scale_axis(ax: "Axes", parameter: Parameter, values: np.ndarray) -> None:
+    """A logarithmic abscissa for a parameter on a log scale whose values differ much; few ticks otherwise.
+
+    Args:
+        ax: axes whose abscissa is the parameter.
+        parameter: the parameter.
+        values: what is drawn of it, SI.
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    if is_wide(parameter, values):
+        ax.set_xscale("log")
+    else:
+        ax.xaxis.set_major_locator(MaxNLocator(4))

@@ -1,0 +1,95 @@
+"""Profile likelihood against closed forms, and where linear theory fails."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy import stats
+
+from fitting.fit import fit
+from fitting.profile import profile
+from tests.fitting.curves import Coefficients, CurveResidual, box, line, noisy, saturation
+from twin._checks import InputError
+from twin.parameters import Parameter, ParameterSpace
+
+
+def test_a_line_has_the_profile_that_linear_theory_says():
+    evidence = noisy(line, [1.0, 2.0], np.linspace(0, 1, 30), 0.1)
+    result = fit(evidence, Coefficients(jnp.asarray([0.0, 0.0])), box(2, -100.0, 100.0))
+    profiles = profile(evidence, result)
+    for i, path in enumerate(("b.0", "b.1")):
+        found = profiles[path]
+        np.testing.assert_allclose(found.interval, result.intervals()[i], rtol=1e-6)
+        # The profile t is a straight line, and the other parameter follows the correlation.
+        np.testing.assert_allclose(
+            found.ratio, (found.values - result.values[i]) / result.standard_errors[i], atol=1e-5
+        )
+        slope = result.covariance[1 - i, i] / result.covariance[i, i]
+        np.testing.assert_allclose(
+            found.others[:, 1 - i], result.values[1 - i] + slope * (found.values - result.values[i]), atol=1e-6
+        )
+        assert found.open == (False, False)
+    assert profiles.lower_cost is None
+
+
+def square(b, x):
+    return b[0] ** 2 + 0 * x
+
+
+def test_a_parameter_that_enters_as_its_square_has_the_interval_of_the_square():
+    """Likelihood intervals are invariant: those of b² are the squares of those of b, whatever linear theory says."""
+    evidence = CurveResidual(square, np.zeros(8), np.full(8, 0.05) + 0.3 * np.sin(np.arange(8.0)), np.asarray(0.3))
+    space = ParameterSpace([Parameter("b.0", "", 0.0, 10.0)])
+    result = fit(evidence, Coefficients(jnp.asarray([0.5])), space, variance="known")
+    found = profile(evidence, result, variance="known")["b.0"]
+    mean, deviation = float(evidence.y.mean()), 0.3 / np.sqrt(8)
+    reach = stats.norm.ppf(0.975) * deviation
+    # Below, the bound ends it: the data cannot tell b from zero.
+    assert found.interval[1] == pytest.approx(np.sqrt(mean + reach), rel=1e-4)
+    assert found.interval[0] == 0.0
+    assert found.open == (True, False)
+    assert result.intervals()[0][0] < 0  # what linear theory says
+
+
+def test_what_the_data_leave_open_is_said_to_be_open():
+    """Far below saturation only the ratio of the two parameters is known: no upper limit on either."""
+    x = np.linspace(0.001, 0.02, 20)
+    evidence = CurveResidual(saturation, x, np.asarray(saturation(np.asarray([2.0, 1.0]), x)), np.asarray(0.005))
+    # So wide that neither is stopped by the other's bound.
+    space = ParameterSpace([Parameter(f"b.{i}", "", 1e-2, upper, scale="log") for i, upper in ((0, 1e5), (1, 1e3))])
+    result = fit(evidence, Coefficients(jnp.asarray([1.0, 1.0])), space, variance="known")
+    found = profile(evidence, result, variance="known")
+    assert found["b.1"].open == (False, True)
+    assert found["b.1"].interval[1] == pytest.approx(1e3)
+    assert 0 < found["b.1"].interval[0] < 1.0
+    assert "above" in str(found)
+
+
+def test_wrong_requests_are_refused():
+    evidence = noisy(line, [1.0, 2.0], np.linspace(0, 1, 30), 0.1)
+    result = fit(evidence, Coefficients(jnp.asarray([0.0, 0.0])), box(2, -100.0, 100.0))
+    with pytest.raises(InputError, match="was not fitted"):
+        profile(evidence, result, parameters=["b.7"])
+    with pytest.raises(InputError, match="level must be between"):
+        profile(evidence, result, level=1.5)
+    with pytest.raises(InputError, match="variance must be"):
+        profile(evidence, result, variance="exact")
+    unfinished = fit(evidence, Coefficients(jnp.asarray([0.0, 0.0])), box(2, -100.0, 100.0), max_steps=0)
+    with pytest.raises(InputError, match="starts from a minimum"):
+        profile(evidence, unfinished)
+
+
+@pytest.mark.slow
+def test_profile_intervals_hold_where_linear_ones_do_not():
+    """Few data far below saturation: 200 repeats, true values inside the profile interval in 95 % of them."""
+    x, deviation, truth = np.linspace(0.1, 1.0, 8), 0.03, np.asarray([1.0, 1.0])
+    space = box(2, 1e-3, 1e4)
+    held = {"profile": 0, "linear": 0}
+    for seed in range(200):
+        evidence = noisy(saturation, truth, x, deviation, seed)
+        result = fit(evidence, Coefficients(jnp.asarray(truth)), space, variance="known")
+        intervals = {"profile": profile(evidence, result, variance="known", points=1)["b.1"].interval}
+        intervals["linear"] = tuple(result.intervals()[1])
+        for kind, (low, high) in intervals.items():
+            held[kind] += bool(low <= truth[1] <= high)
+    assert 0.93 <= held["profile"] / 200 <= 0.97
+    assert held["linear"] / 200 < 0.92

@@ -28,8 +28,8 @@ Combine = Callable[[Objective, Any], Objective]
 Keep = Callable[[float, float], bool]
 
 WIDTH = 16
-"""Lanes of one program: a multiple of every vector length, so that no lane is computed differently from another, and few
-enough that Jacobians stay in the cache."""
+"""Lanes of one program: a multiple of every vector length, so that no lane is computed differently from another, and
+few enough that Jacobians stay in the cache."""
 STRIDE = 4
 """Steps between two looks at which lanes have ended."""
 

@@ -67,7 +67,7 @@ _FIXED = (
     _problem("Freudenstein and Roth", fixed.freudenstein_roth, [0.5, -2], 0.0, 48.98425367924),
     _problem("Powell badly scaled", fixed.powell_badly_scaled, [0, 1], 0.0),
     _problem("Brown badly scaled", fixed.brown_badly_scaled, [1, 1], 0.0),
-    _problem("Beale", fixed.beale, [1, 1], 0.0),
+    _problem("Beale", fixed.beale, [1, 1], 0.0, 0.452008929),
     _problem("Jennrich and Sampson", fixed.jennrich_sampson, [0.3, 0.4], 124.3621823556, 259.580190134),
     _problem("helical valley", fixed.helical_valley, [-1, 0, 0], 0.0),
     _problem("Bard", fixed.bard, [1, 1, 1], 8.214877306579e-3, 17.42869333),

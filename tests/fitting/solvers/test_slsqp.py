@@ -129,7 +129,9 @@ def test_bounds_are_never_left_by_any_point_that_is_evaluated(runner, x0, x1, lo
     run = runner(VALLEY._replace(start=np.array([x0, x1]), lower=lower, upper=lower + np.array([width0, width1])))
     assert run.outside == 0
     if run.success:
-        assert run.violation <= 1e-8 and run.residual <= 1e-4
+        # A promised reduction of 1e-10·f leaves a gradient of √(1e-10·f·curvature): 1e-4 and more, as the curvature
+        # here is up to 1e4 and f may be as large.
+        assert run.violation <= 1e-8 and run.residual <= 1e-2
     else:
         # A box beyond the disc.
         nearest = np.clip(0.0, lower, run.problem.upper)

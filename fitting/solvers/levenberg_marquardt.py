@@ -59,7 +59,8 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
     foreseen.
     Each step solves the damped linear least-squares problem within the bounds themselves, by an active set (not a
     change of variables, not a clipped step). No unit of a variable matters, as a step's length is weighted by the
-    Jacobian's column norms. As in Moré's, former norms count too, for they keep a variable from running away when its column
+    Jacobian's column norms. As in Moré's, former norms count too, for they keep a variable from running away when
+    its column
     vanishes; here the memory fades as the cost falls, so that a far start does not tie the variables down for good.
 
     It has converged when the linear model promises nothing more (`rtol` on the relative offset), when the undamped step

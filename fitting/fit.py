@@ -170,6 +170,12 @@ def chosen_solver(solver: Solver | None, constraints: tuple[AbstractConstraint, 
     return solver
 
 
+@eqx.filter_jit
+def _twice(residual: AbstractResidual, model: Any) -> tuple[Any, Any]:
+    """Compiled for the sake of the cache: the next fit of this structure is checked without being traced."""
+    return residual(model), residual(model)
+
+
 def check_residual(residual: AbstractResidual, model: Any, space: ParameterSpace) -> int:
     """Raise unless a residual is a vector with at least as many entries as there are parameters.
 
@@ -184,7 +190,7 @@ def check_residual(residual: AbstractResidual, model: Any, space: ParameterSpace
     Raises:
         InputError: naming what is wrong.
     """
-    shape, again = (eqx.filter_eval_shape(lambda m: residual(m), model) for _ in range(2))
+    shape, again = eqx.filter_eval_shape(_twice, residual, model)
     if shape.shape != again.shape:
         raise InputError(
             f"The residual changes its shape from call to call ({shape.shape}, then {again.shape}). Fix which samples "

@@ -101,7 +101,7 @@ def profile(
     solver: Solver | None = None,
     max_steps: int = 50,
     points: int = 8,
-    rounds: int = 10,
+    rounds: int = 40,
 ) -> ProfileResult:
     """Profile likelihood of a fit, with intervals that need no linear theory.
 
@@ -119,7 +119,7 @@ def profile(
         solver: as in the fit.
         max_steps: steps of each fit.
         points: points on each side besides those that the search for the ends needs.
-        rounds: most rounds of that search.
+        rounds: most rounds of that search, each a batch of one fit for each end not found yet.
 
     Returns:
         The profiles.
@@ -154,6 +154,7 @@ def profile(
         if not search.advance():
             break
     search.fill(points)
+    unsettled = search.unsettled()
     found = tuple(_profile(search, path, i) for path, i in zip(paths, search.indices, strict=True))
     lowest = search.lowest
     fell = lowest < result.cost * (1 - 1e-6)
@@ -163,6 +164,8 @@ def profile(
         if fell
         else ""
     )
+    if unsettled:
+        message = f"{message} The search for the ends ran out of rounds at {', '.join(unsettled)}.".strip()
     return ProfileResult(found, level, search.critical, lowest if fell else None, message)
 
 
@@ -192,7 +195,3 @@ def _profile(search: ProfileSearch, path: str, index: int) -> Profile:
         interval=(reach[0], reach[1]),
         open=(ends[0] is None, ends[1] is None),
     )
-
-
-def _open_sides(profile: Profile) -> str:
-    return " and ".join(side for side, open_ in zip(("below", "above"), profile.open, strict=True) if open_)

@@ -1,5 +1,7 @@
 """The search for the ends of profile intervals: all parameters and both sides move on as one batch."""
 
+import itertools
+
 import numpy as np
 
 from fitting.lanes import Task, solve_lanes
@@ -17,6 +19,7 @@ class Side:
         self.next = min(scale, room)
         self.open = room <= 0
         self.done = self.open
+        self.bracket = np.inf
 
     def note(self, shift: float, ratio: float, vector: np.ndarray) -> None:
         """Add a point; a fit that failed counts as not seen."""
@@ -28,27 +31,37 @@ class Side:
         # The estimate itself, at shift 0, has no entry here.
         self.vectors.insert(at - 1, vector)
 
+    def crossing(self, critical: float) -> int | None:
+        """Number of the point after which the ratio first crosses the critical value."""
+        for i, (before, after) in enumerate(itertools.pairwise(self.ratios)):
+            if before < critical <= after:
+                return i
+        return None
+
     def end(self, critical: float) -> float | None:
         """Shift at which the ratio first crosses the critical value, between the points known."""
-        for (a, ra), (b, rb) in zip(
-            zip(self.shifts, self.ratios, strict=True), zip(self.shifts[1:], self.ratios[1:], strict=True), strict=False
-        ):
-            if ra < critical <= rb:
-                return a + (critical - ra) / (rb - ra) * (b - a)
-        return None
+        i = self.crossing(critical)
+        if i is None:
+            return None
+        (a, b), (ra, rb) = self.shifts[i : i + 2], self.ratios[i : i + 2]
+        return a + (critical - ra) / (rb - ra) * (b - a)
 
     def plan(self, critical: float) -> None:
         """Where to look next: between the points if the end is there, else farther out."""
-        end = self.end(critical)
+        i, end = self.crossing(critical), self.end(critical)
         last, ratio = self.shifts[-1], self.ratios[-1]
-        if end is not None:
-            below = max(r for s, r in zip(self.shifts, self.ratios, strict=True) if s <= end)
-            above = min((r for s, r in zip(self.shifts, self.ratios, strict=True) if s >= end), default=np.inf)
-            # Within a tenth on both sides the straight line between two points is good to a thousandth.
-            self.done = min(critical - below, above - critical) < 0.003 * critical
-            self.next = end
+        if i is not None and end is not None:
+            (a, b), (below, above) = self.shifts[i : i + 2], self.ratios[i : i + 2]
+            self.done = min(critical - below, above - critical) < 0.003 * critical or b - a < 1e-9 * b
+            # A straight line between points that are far apart creeps up from one side: halve instead.
+            self.next = 0.5 * (a + b) if b - a > 0.5 * self.bracket else end
+            self.bracket = b - a
         elif last >= self.room:
             self.open = self.done = True
+        elif last > 0 and self.next > last:
+            # The fit there failed: less far out.
+            self.next = 0.5 * (last + self.next)
+            self.done = self.open = self.next - last <= 1e-6 * last
         else:
             growth = np.clip(1.05 * critical / max(ratio, 1e-3 * critical), 1.2, 3.0)
             self.next = min(max(last, 1e-12) * growth if last > 0 else self.next / 3, self.room)
@@ -92,6 +105,11 @@ class ProfileSearch:
             for side in busy:
                 side.plan(self.critical)
         return any(not side.done for side in self.sides)
+
+    def unsettled(self) -> list[str]:
+        """Parameters of which an end is only known roughly."""
+        paths = self.result.space.paths
+        return list(dict.fromkeys(paths[side.index] for side in self.sides if not side.done))
 
     def fill(self, points: int) -> None:
         """Points in between, for the picture."""

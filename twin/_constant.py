@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
-from twin._recursion import flattener, run_recursion
+from twin._recursion import run_recursion
 from twin.control.closed_loop import SampledLoop
 from twin.plant import AbstractPlant
 from twin.references import AbstractReference
@@ -23,21 +23,19 @@ def solve_constant(
 ) -> tuple[PyTree[Array], Float[Array, ""]]:
     """States at the times, and the error estimate relative to the tolerance."""
     parameters, fixed = eqx.partition((plant, reference), eqx.is_inexact_array)
-    ravel, unravel = flattener(state)
 
-    def step(parameters: PyTree[Array], x: Array, span: tuple[Array, Array]) -> tuple[Array, Array]:
+    def step(parameters: PyTree[Array], x: PyTree[Array], span: tuple[Array, Array]) -> tuple[Any, Any]:
         plant, reference = eqx.combine(parameters, fixed)
         begin, end = span
 
         def field(t: Array, y: PyTree[Array]) -> PyTree[Array]:
             return plant.vector_field(t, y, reference(t))
 
-        after, error = runge_kutta_steps(stepping, field, begin, end - begin, unravel(x))
-        return ravel(after), ravel(error)
+        return runge_kutta_steps(stepping, field, begin, end - begin, x)
 
-    before, last, errors = run_recursion(step, parameters, ravel(state), (times[:-1], times[1:]))
-    vectors = jnp.concatenate([before, last[None]])
-    return jax.vmap(unravel)(vectors), _relative_error(stepping, errors, vectors)
+    before, last, errors = run_recursion(step, parameters, state, (times[:-1], times[1:]))
+    states = jax.tree.map(lambda rows, end: jnp.concatenate([rows, end[None]]), before, last)
+    return states, _relative_error(stepping, errors, states)
 
 
 def run_sampled_loop(
@@ -53,15 +51,13 @@ def run_sampled_loop(
     injected = None if loop.injection is None else jax.vmap(loop.injection)(times)
     memory = loop.controller.initial_state(loop.measure(times[0], plant_state), loop.period)
     parameters, fixed = eqx.partition(loop, eqx.is_inexact_array)
-    ravel, unravel = flattener((plant_state, memory))
-    ravel_state, _ = flattener(plant_state)
 
-    def tick(loop: SampledLoop, x: Array, item: Any) -> tuple[Any, Any, Any]:
-        (state, memory), (t, wanted, added) = unravel(x), item
+    def tick(loop: SampledLoop, x: PyTree[Array], item: Any) -> tuple[Any, Any, Any]:
+        (state, memory), (t, wanted, added) = x, item
         memory, command = loop.controller.update(memory, wanted, loop.measure(t, state), loop.period)
         return state, memory, loop.inputs(command, added)
 
-    def step(parameters: PyTree[Array], x: Array, item: Any) -> tuple[Array, Array]:
+    def step(parameters: PyTree[Array], x: PyTree[Array], item: Any) -> tuple[Any, Any]:
         loop = eqx.combine(parameters, fixed)
         state, memory, inputs = tick(loop, x, item)
 
@@ -69,18 +65,21 @@ def run_sampled_loop(
             return loop.plant.vector_field(time, y, inputs)
 
         after, error = runge_kutta_steps(stepping, field, item[0], loop.period, state)
-        return ravel((after, memory)), ravel_state(error)
+        return (after, memory), error
 
-    def observe(x: Array, item: Any) -> tuple[Any, Any]:
+    def observe(x: PyTree[Array], item: Any) -> tuple[Any, Any]:
         state, _, inputs = tick(loop, x, item)
         return state, loop.plant.outputs(item[0], state, inputs)
 
     items = (times, references, injected)
-    vectors, _, errors = run_recursion(step, parameters, ravel((plant_state, memory)), items)
-    states, outputs = jax.vmap(observe)(vectors, items)
-    return states, outputs, _relative_error(stepping, errors, jax.vmap(ravel_state)(states))
+    rows, _, errors = run_recursion(step, parameters, (plant_state, memory), items)
+    states, outputs = jax.vmap(observe)(rows, items)
+    return states, outputs, _relative_error(stepping, errors, states)
 
 
-def _relative_error(stepping: ConstantSteps, errors: Float[Array, "steps n"], states: Array) -> Float[Array, ""]:
-    largest = jax.lax.stop_gradient(jnp.max(jnp.abs(states), axis=0))
-    return jnp.max(errors / (stepping.atol + stepping.rtol * largest))
+def _relative_error(stepping: ConstantSteps, errors: PyTree[Array], states: PyTree[Array]) -> Float[Array, ""]:
+    def largest(error: Array, state: Array) -> Array:
+        reached = jax.lax.stop_gradient(jnp.max(jnp.abs(state), axis=0))
+        return jnp.max(error / (stepping.atol + stepping.rtol * reached))
+
+    return jnp.max(jnp.stack(jax.tree.leaves(jax.tree.map(largest, errors, states))))

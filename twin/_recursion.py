@@ -28,11 +28,11 @@ _CHUNK = 256
 
 
 def run_recursion(
-    step: Callable[[PyTree[Array], Float[Array, " n"], PyTree[Array]], tuple[Float[Array, " n"], Array]],
+    step: Callable[[PyTree[Array], PyTree[Array], PyTree[Array]], tuple[PyTree[Array], PyTree[Array]]],
     parameters: PyTree[Array],
-    start: Float[Array, " n"],
+    start: PyTree[Array],
     items: PyTree[Array],
-) -> tuple[Float[Array, "steps n"], Float[Array, " n"], Array]:
+) -> tuple[PyTree[Array], PyTree[Array], PyTree[Array]]:
     """All states of a recursion; forward and reverse mode both work.
 
     Args:
@@ -45,19 +45,38 @@ def run_recursion(
     Returns:
         The states before each step, the state after the last one, and what else the steps returned, stacked.
     """
-
-    def plain(parameters: PyTree[Array], start: Array, items: PyTree[Array]) -> tuple[Array, Array, Array]:
-        def body(x: Array, item: PyTree[Array]) -> tuple[Array, tuple[Array, Array]]:
-            after, extra = step(parameters, x, item)
-            return after, (x, jax.lax.stop_gradient(extra))
-
-        last, (states, extras) = jax.lax.scan(body, start, items)
-        return states, last, extras
-
     if _in_batch.get() or (LOOP_OPTION in os.environ.get("XLA_FLAGS", "") and jax.default_backend() == "cpu"):
-        return plain(parameters, start, items)
+        # A state stays in its parts: in a batch every part is then one run of numbers, as vector units want it.
+        return _plain(step, parameters, start, items)
+    ravel, unravel = _flattener(start)
 
-    run = jax.custom_jvp(plain)
+    def flat_step(parameters: PyTree[Array], x: Array, item: PyTree[Array]) -> tuple[Array, PyTree[Array]]:
+        after, extra = step(parameters, unravel(x), item)
+        return ravel(after), extra
+
+    states, last, extras = _run_afterwards(flat_step, parameters, ravel(start), items)
+    return jax.vmap(unravel)(states), unravel(last), extras
+
+
+def _plain(step: Callable, parameters: PyTree[Array], start: PyTree[Array], items: PyTree[Array]) -> tuple:
+    start = jax.tree.map(jnp.asarray, start)
+
+    def body(x: PyTree[Array], item: PyTree[Array]) -> tuple[PyTree[Array], tuple[PyTree[Array], PyTree[Array]]]:
+        after, extra = step(parameters, x, item)
+        after = jax.tree.map(lambda new, old: jnp.asarray(new, old.dtype), after, x)
+        return after, (x, jax.lax.stop_gradient(extra))
+
+    last, (states, extras) = jax.lax.scan(body, start, items)
+    return states, last, extras
+
+
+def _run_afterwards(
+    step: Callable[[PyTree[Array], Float[Array, " n"], PyTree[Array]], tuple[Float[Array, " n"], PyTree[Array]]],
+    parameters: PyTree[Array],
+    start: Float[Array, " n"],
+    items: PyTree[Array],
+) -> tuple[Float[Array, "steps n"], Float[Array, " n"], PyTree[Array]]:
+    run = jax.custom_jvp(lambda parameters, start, items: _plain(step, parameters, start, items))
 
     # All steps at once: x'[k+1] = A[k]·x'[k] + b[k] leaves only tiny matrix products to the recursion.
     @run.defjvp
@@ -80,7 +99,7 @@ def run_recursion(
             return jnp.sum(at[0] * dx, axis=-1) + at[1], dx
 
         d_last, d_states = jax.lax.scan(body, d_start, (a, b))
-        return (states, last, extras), (d_states, d_last, jnp.zeros_like(extras))
+        return (states, last, extras), (d_states, d_last, jax.tree.map(jnp.zeros_like, extras))
 
     return run(parameters, start, items)
 
@@ -105,7 +124,7 @@ def _map_in_chunks(function: Callable, items: PyTree[Array]) -> PyTree[Array]:
     return jax.tree.map(lambda x: x.reshape((filled, *x.shape[2:]))[:count], out)
 
 
-def flattener(example: PyTree[Array]) -> tuple[Callable[[PyTree[Array]], Array], Callable[[Array], PyTree[Array]]]:
+def _flattener(example: PyTree[Array]) -> tuple[Callable[[PyTree[Array]], Array], Callable[[Array], PyTree[Array]]]:
     """Functions from a tree of arrays to a vector and back."""
     _, unravel = ravel_pytree(example)
     return lambda tree: ravel_pytree(tree)[0], unravel

@@ -76,3 +76,20 @@ def test_wrong_requests_are_refused():
     unfinished = fit(evidence, Coefficients(jnp.asarray([0.0, 0.0])), box(2, -100.0, 100.0), max_steps=0)
     with pytest.raises(InputError, match="starts from a minimum"):
         profile(evidence, unfinished)
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_truth_where_those_of_linear_theory_do_not():
+    """200 repeats of a curve that hardly saturates: linear intervals are symmetric, and too short above."""
+    truth, space, repeats = np.asarray([1.0, 1.0]), box(2, 1e-3, 1e3), 200
+    linear, likelihood = 0, 0
+    for seed in range(repeats):
+        evidence = noisy(saturation, truth, np.linspace(0.1, 1.0, 8), 0.07, seed)
+        result = fit(evidence, Coefficients(jnp.asarray(truth)), space, variance="known")
+        found = profile(evidence, result, parameters=["b.0"], variance="known", points=0)
+        assert not found.message
+        (low, high), (below, above) = result.intervals()[0], found["b.0"].interval
+        linear += low <= truth[0] <= high
+        likelihood += below <= truth[0] <= above
+    assert 0.93 <= likelihood / repeats <= 0.97
+    assert linear / repeats < 0.88

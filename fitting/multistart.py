@@ -5,8 +5,6 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 from scipy import stats
@@ -213,8 +211,8 @@ def multistart(
     results = {i: result_of(ended.kept[i], model, space, correlated=correlated, variance=variance) for i in chosen}
     return MultistartResult(
         space=space,
-        starts=_unscaled(space, vectors),
-        values=_unscaled(space, ended.vector),
+        starts=space.unscaled_rows(vectors),
+        values=space.unscaled_rows(ended.vector),
         costs=ended.cost,
         stops=ended.stop,
         steps=ended.steps,
@@ -229,12 +227,7 @@ def _given(values: np.ndarray, space: ParameterSpace) -> np.ndarray:
             f"starts has shape {values.shape}; give a number of starts, or an array of one row per start and "
             f"{len(space)} columns ({', '.join(space.paths)})."
         )
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(jax.vmap(space.scaled)(jnp.asarray(values)))
-
-
-def _unscaled(space: ParameterSpace, vectors: np.ndarray) -> np.ndarray:
-    return np.asarray(jax.vmap(space.unscaled)(jnp.asarray(vectors)))
+    return space.scaled_rows(values)
 
 
 def _clusters(ended: Ended, *, closeness: float = 1e-3) -> np.ndarray:

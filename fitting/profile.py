@@ -4,8 +4,6 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from scipy import stats
 
@@ -191,7 +189,7 @@ def _profile(search: ProfileSearch, path: str, index: int) -> Profile:
         estimate=float(search.result.values[index]),
         values=np.asarray([value(shift) for shift in shifts]),
         ratio=ratio,
-        others=np.asarray(jax.vmap(space.unscaled)(jnp.asarray(vectors))),
+        others=space.unscaled_rows(vectors),
         interval=(reach[0], reach[1]),
         open=(ends[0] is None, ends[1] is None),
     )

@@ -8,6 +8,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, ArrayLike, Complex, Float, PyTree
 
 from twin._checks import InputError, as_array, as_scalar, require_x64
+from twin._small_systems import solve_many
 from twin.frf import FRF
 from twin.plant import AbstractPlant
 
@@ -32,13 +33,9 @@ class StateSpace(eqx.Module):
 
     def response(self, frequency: Float[Array, "frequencies"]) -> Complex[Array, "outputs inputs frequencies"]:
         """Complex response C(jωI - A)⁻¹B + D, times e^(-jω·delay), at frequencies [Hz]."""
-        identity = jnp.eye(self.a.shape[0])
-
-        def at(f: Array) -> Array:
-            s = 2j * jnp.pi * f
-            return (self.c @ jnp.linalg.solve(s * identity - self.a, self.b + 0j) + self.d) * jnp.exp(-s * self.delay)
-
-        return jnp.moveaxis(jax.vmap(at)(frequency), 0, -1)
+        s = 2j * jnp.pi * frequency
+        states = solve_many(jnp.eye(self.a.shape[0])[..., None] * s - self.a[..., None], _at_all(self.b, frequency))
+        return (jnp.einsum("ij,jkf->ikf", self.c + 0j, states) + self.d[..., None]) * jnp.exp(-s * self.delay)
 
 
 class SecondOrder(eqx.Module):
@@ -64,12 +61,17 @@ class SecondOrder(eqx.Module):
     def response(self, frequency: Float[Array, "frequencies"]) -> Complex[Array, "outputs inputs frequencies"]:
         """Complex receptance P(-ω²M + jωC + jD + K)⁻¹B at frequencies [Hz]."""
 
-        def at(f: Array) -> Array:
-            omega = 2 * jnp.pi * f
-            dynamic = self.stiffness - omega**2 * self.mass + 1j * (omega * self.viscous + self.hysteretic)
-            return self.output_map @ jnp.linalg.solve(dynamic, self.input_map + 0j)
+        omega = 2 * jnp.pi * frequency
+        mass, viscous = self.mass[..., None], self.viscous[..., None]
+        real = self.stiffness[..., None] - omega**2 * mass
+        imaginary = omega * viscous + self.hysteretic[..., None]
+        motion = solve_many(real + 1j * imaginary, _at_all(self.input_map, frequency))
+        return jnp.einsum("ij,jkf->ikf", self.output_map + 0j, motion)
 
-        return jnp.moveaxis(jax.vmap(at)(frequency), 0, -1)
+
+def _at_all(matrix: Array, frequency: Array) -> Array:
+    """A complex copy of a matrix for every frequency, on the last axis."""
+    return jnp.broadcast_to(matrix[..., None] + 0j, (*matrix.shape, frequency.size))
 
 
 def linearise(

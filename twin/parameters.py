@@ -171,6 +171,18 @@ class ParameterSpace(eqx.Module):
         """The scaled vector to values in SI."""
         return jnp.stack([p.from_scaled(v) for p, v in zip(self.parameters, vector, strict=True)])
 
+    def scaled_rows(self, values: np.ndarray) -> np.ndarray:
+        """`scaled` of many vectors (rows, parameters), outside of compiled code: any number, nothing to compile."""
+        logs = [p.scale == "log" for p in self.parameters]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.where(logs, np.log(values), values / [p._size() for p in self.parameters])
+
+    def unscaled_rows(self, vectors: np.ndarray) -> np.ndarray:
+        """`unscaled` of many vectors (rows, parameters) outside of compiled code."""
+        logs = [p.scale == "log" for p in self.parameters]
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.where(logs, np.exp(vectors), vectors * [p._size() for p in self.parameters])
+
     def slopes(self, values: Float[Array, "parameters"]) -> Float[Array, "parameters"]:
         """Derivatives of the values with respect to the scaled vector."""
         return jnp.stack([p.slope(v) for p, v in zip(self.parameters, values, strict=True)])

@@ -95,8 +95,9 @@ def bounded_least_squares(
     damping: Float[Array, "columns"],
     lower: Float[Array, "columns"],
     upper: Float[Array, "columns"],
+    start: tuple[Float[Array, "columns"], Bool[Array, "columns"]] | None = None,
 ) -> tuple[Float[Array, "columns"], Bool[Array, "columns"]]:
-    """min ‖A x - b‖² + ‖damping·x‖² subject to lower ≤ x ≤ upper, by a primal active set from x = 0.
+    """min ‖A x - b‖² + ‖damping·x‖² subject to lower ≤ x ≤ upper, by a primal active set.
 
     Every iterate is within the bounds and none is worse than the one before: a variable that would leave is held at its
     bound, and the one whose bound holds back most is let go (Björck, "Numerical Methods for Least Squares Problems",
@@ -108,6 +109,7 @@ def bounded_least_squares(
         damping: positive weights.
         lower: lower bounds, at most zero.
         upper: upper bounds, at least zero.
+        start: the answer to a similar problem within the same bounds; x = 0 if there is none.
 
     Returns:
         x within the bounds, and which entries sit on a bound that holds them back.
@@ -153,8 +155,14 @@ def bounded_least_squares(
         _, _, _, settled, count = carry
         return ~settled & (count < 10 * columns)
 
-    pushed_down = ((lower == 0) & (gradient_at_zero > 0)) | pinned
-    pushed_up = (upper == 0) & (gradient_at_zero < 0) & ~pinned
-    start = (jnp.zeros(columns), pushed_down, pushed_up, jnp.asarray(False), jnp.asarray(0))
-    x, at_lower, at_upper, _, _ = jax.lax.while_loop(unsettled, body, start)
+    if start is None:
+        x = jnp.zeros(columns)
+        at_lower = ((lower == 0) & (gradient_at_zero > 0)) | pinned
+        at_upper = (upper == 0) & (gradient_at_zero < 0) & ~pinned
+    else:
+        x, active = start
+        at_lower = (active & (x == lower)) | pinned
+        at_upper = active & (x == upper) & ~pinned
+    carry = (x, at_lower, at_upper, jnp.asarray(False), jnp.asarray(0))
+    x, at_lower, at_upper, _, _ = jax.lax.while_loop(unsettled, body, carry)
     return x, at_lower | at_upper

@@ -64,11 +64,13 @@ class LinearModel(eqx.Module):
             first = count == 0
             # Just enough damping of the Gauss-Newton step to make directions that the data do not see harmless.
             roots = jnp.where(first, 1e-10, jnp.sqrt(damping) * weights)
-            z, active = bounded_least_squares(self.matrix, -self.projected, roots, self.lower, self.upper)
+            before = (steps.damped, steps.held)
+            z, active = bounded_least_squares(self.matrix, -self.projected, roots, self.lower, self.upper, before)
             steps = Steps(
                 newton=jnp.where(first, z, steps.newton),
                 active=jnp.where(first, active, steps.active),
                 damped=z,
+                held=active,
                 damping=damping,
             )
             length, full = _length(weights * z), _length(weights * steps.newton)
@@ -87,7 +89,9 @@ class LinearModel(eqx.Module):
             return ~met & (count < 9)
 
         zero = jnp.zeros_like(ceiling)
-        nothing = Steps(jnp.zeros_like(weights), jnp.zeros_like(weights, dtype=bool), jnp.zeros_like(weights), zero)
+        still, gradient = jnp.zeros_like(weights), self.matrix.T @ self.projected
+        pushed = jnp.where(gradient > 0, self.lower == 0, (gradient < 0) & (self.upper == 0))
+        nothing = Steps(newton=still, active=pushed, damped=still, held=pushed, damping=zero)
         start = (nothing, zero, zero, ceiling, jnp.asarray(False), jnp.asarray(0))
         return jax.lax.while_loop(unmet, refine, start)[0]
 
@@ -101,6 +105,8 @@ class Steps(eqx.Module):
     """Which variables the Gauss-Newton step leaves on a bound that holds them back."""
     damped: Float[Array, "variables"]
     """The step z within the radius."""
+    held: Bool[Array, "variables"]
+    """Which variables that step leaves on a bound that holds them back."""
     damping: Float[Array, ""]
     """λ of that step; zero if it is the Gauss-Newton step."""
 

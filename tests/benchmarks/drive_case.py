@@ -1,13 +1,15 @@
 """An eight-parameter drive fit: a two-mass drive with friction on both sides in a continuous cascade, simulated."""
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from fitting.residuals.residual import AbstractResidual
 from fitting.residuals.trajectory import TrajectoryResidual
 from tests.reference_systems import ContinuousCascade
 from twin.control import ClosedLoop
@@ -15,7 +17,7 @@ from twin.drives import TwoMass
 from twin.laws import CoulombViscousFriction
 from twin.parameters import Parameter, ParameterSpace
 from twin.record import Record
-from twin.references import AbstractReference, JerkLimitedMove
+from twin.references import JerkLimitedMove
 from twin.simulation import simulate
 from twin.stepping import ConstantSteps
 
@@ -42,17 +44,17 @@ PERIOD = 1e-3
 """Between samples [s]."""
 
 
-class DriveCase(NamedTuple):
+class Case(NamedTuple):
     """Evidence, a model and its free parameters."""
 
-    residual: TrajectoryResidual
-    model: ClosedLoop
+    residual: AbstractResidual
+    model: Any
     space: ParameterSpace
-    move: JerkLimitedMove
-    times: np.ndarray
+    throughout: Callable[[np.ndarray], np.ndarray]
+    """The residual of a scaled vector by NumPy and SciPy alone."""
 
 
-def drive_case(samples: int = 300, *, seed: int = 1) -> DriveCase:
+def drive_case(samples: int = 300, *, seed: int = 1) -> Case:
     """Simulate the record.
 
     Args:
@@ -66,7 +68,7 @@ def drive_case(samples: int = 300, *, seed: int = 1) -> DriveCase:
         CoulombViscousFriction(values[6], values[7], WIDTH),
     )
     model = ClosedLoop(plant, ContinuousCascade(*GAINS))
-    move: AbstractReference = JerkLimitedMove(1.0, 12.0, 300.0, 2e4, start_time=0.01)
+    move = JerkLimitedMove(1.0, 12.0, 300.0, 2e4, start_time=0.01)
     times, stepping = np.arange(samples) * PERIOD, ConstantSteps(substeps=2)
     clean = eqx.filter_jit(simulate)(model, move, jnp.asarray(times), stepping=stepping)
     noise = np.random.default_rng(seed)
@@ -77,19 +79,20 @@ def drive_case(samples: int = 300, *, seed: int = 1) -> DriveCase:
     space = ParameterSpace(
         [Parameter(path, unit, v / SPREAD, v * SPREAD, scale="log") for path, (v, unit) in TRUTH.items()]
     )
-    return DriveCase(TrajectoryResidual.create(record, move, DEVIATION, stepping=stepping), model, space, move, times)
+    wanted = _sampled_reference(move, times)
+    measured = [np.asarray(channels[name]) for name in DEVIATION]
+    return Case(
+        TrajectoryResidual.create(record, move, DEVIATION, stepping=stepping),
+        model,
+        space,
+        lambda vector: _scipy_residual(wanted, times, measured, vector),
+    )
 
 
-def scipy_residual(case: DriveCase, vector: np.ndarray) -> np.ndarray:
-    """The same residual by `scipy.integrate.solve_ivp`, written out in plain Python.
-
-    Args:
-        case: the drive fit.
-        vector: logarithms of the parameters.
-    """
+def _scipy_residual(wanted: Callable, times: np.ndarray, measured: list[np.ndarray], vector: np.ndarray) -> np.ndarray:
+    """The same residual by `scipy.integrate.solve_ivp`, written out in plain Python."""
     j1, j2, k, d, c1, v1, c2, v2 = np.exp(vector).tolist()
     kp, kv, ki = GAINS
-    wanted = _sampled_reference(case)
 
     def rate(t: float, y: np.ndarray) -> tuple[float, ...]:
         q1, q2, w1, w2, total = y.tolist()
@@ -100,11 +103,10 @@ def scipy_residual(case: DriveCase, vector: np.ndarray) -> np.ndarray:
         a2 = (shaft - c2 * _sign(w2) - v2 * w2) / j2
         return w1, w2, a1, a2, ki * (position - q1)
 
-    end = float(case.times[-1])
-    solution = solve_ivp(rate, (0.0, end), np.zeros(5), t_eval=case.times, rtol=1e-6, atol=1e-9, max_step=5e-3)
+    end = float(times[-1])
+    solution = solve_ivp(rate, (0.0, end), np.zeros(5), t_eval=times, rtol=1e-6, atol=1e-9, max_step=5e-3)
     parts = [
-        (solution.y[i] - np.asarray(measured)) / sd
-        for i, measured, sd in zip((0, 1), case.residual.measured, DEVIATION.values(), strict=True)
+        (solution.y[i] - channel) / sd for i, channel, sd in zip((0, 1), measured, DEVIATION.values(), strict=True)
     ]
     return np.concatenate(parts)
 
@@ -113,12 +115,12 @@ def _sign(w: float) -> float:
     return w / math.sqrt(w * w + WIDTH * WIDTH)
 
 
-def _sampled_reference(case: DriveCase):
+def _sampled_reference(move: JerkLimitedMove, times: np.ndarray) -> Callable:
     """Position and velocity of the move, from a fine table: calling JAX in a right-hand side would not be fair."""
     import jax
 
-    fine = np.linspace(0, float(case.times[-1]), 4 * case.times.size)
-    points = jax.vmap(case.move)(jnp.asarray(fine))
+    fine = np.linspace(0, float(times[-1]), 4 * times.size)
+    points = jax.vmap(move)(jnp.asarray(fine))
     position, velocity, step = np.asarray(points.position).tolist(), np.asarray(points.velocity).tolist(), fine[1]
 
     def wanted(t: float) -> tuple[float, float]:

@@ -51,7 +51,7 @@ def main() -> None:
         results["nonlinear_programmes"] = programmes.as_dictionary(found, speeds)
 
     if "multistart" in options.sections:
-        rows = multistart.multistart_speeds()
+        rows = multistart.all_cases()
         text += multistart.as_markdown(rows) + "\n"
         results["multistart"] = multistart.as_dictionary(rows)
     if "swarm" in options.sections:

@@ -1,7 +1,8 @@
 """Swarm ledger: what a particle swarm, SLSQP and Levenberg-Marquardt pay for the same error.
 
 The problems are those that Leipe et al. give to a swarm (stiffness and damping surfaces, eq. 3 to 10, with the
-published parameters as truth and noise of the published remaining error), and the drive fit of `drive_case`.
+published parameters as truth and noise of the published remaining error), and the drive fits of `drive_case` and
+`frequency_case`.
 """
 
 import time
@@ -18,6 +19,7 @@ from fitting.residuals.residual import AbstractResidual
 from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt
 from fitting.solvers.slsqp import SLSQP
 from tests.benchmarks.drive_case import drive_case
+from tests.benchmarks.frequency_case import frequency_case
 from twin._checks import as_array
 from twin.parameters import Parameter, ParameterSpace
 
@@ -82,11 +84,12 @@ def _surface(law, truth, relative, units):
 
 def problems():
     """Name, residual, model and space of each problem."""
-    drive = drive_case(200)
+    drive, responses = drive_case(200), frequency_case()
     return {
         "Leipe stiffness (2)": _surface(stiffness, [1.8709e7, 5.6406], 0.0401, ("", "1")),
         "Leipe damping (3)": _surface(damping, [9.5376e5, 148.3813, 2.0734e4], 0.0451, ("", "N", "N s/m")),
         "drive record (8)": (drive.residual, drive.model, drive.space),
+        "drive's frequency responses (8)": (responses.residual, responses.model, responses.space),
     }
 
 

@@ -1,0 +1,69 @@
+"""Small dense linear systems, many at once, written out in JAX.
+
+LAPACK's batched factorisations share the thread pool of the program that calls them: two programs in loops of them wait
+for each other for ever (trap 23). For the few unknowns of a drive this is faster as well, as all systems are eliminated
+side by side.
+"""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Inexact
+
+MOST = 24
+"""Unknowns up to which systems are eliminated here, and beyond which LAPACK is called."""
+
+
+def solve_many(
+    matrices: Inexact[Array, "n n systems"], right: Inexact[Array, "n columns systems"]
+) -> Inexact[Array, "n columns systems"]:
+    """Solutions X of A·X = B for many systems; the last axis runs over them. Differentiable in both modes.
+
+    Args:
+        matrices: A.
+        right: B.
+
+    Returns:
+        X; not finite where A is singular.
+    """
+    if matrices.shape[0] > MOST:
+        solution = jnp.linalg.solve(jnp.moveaxis(matrices, -1, 0), jnp.moveaxis(right, -1, 0))
+        return jnp.moveaxis(solution, 0, -1)
+    return _solve(matrices, right)
+
+
+@jax.custom_jvp
+def _solve(matrices: Array, right: Array) -> Array:
+    return _product(_inverse(matrices), right)
+
+
+@_solve.defjvp
+def _solve_jvp(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
+    # dX = A⁻¹(dB - dA·X): the inverse serves all directions.
+    (matrices, right), (d_matrices, d_right) = primals, tangents
+    inverse = _inverse(matrices)
+    solution = _product(inverse, right)
+    return solution, _product(inverse, d_right - _product(d_matrices, solution))
+
+
+def _product(left: Array, right: Array) -> Array:
+    """A·B for each system; written as a sum, which a batch of tiny products is best at."""
+    return jnp.sum(left[:, :, None] * right[None], axis=1)
+
+
+def _inverse(matrices: Array) -> Array:
+    """A⁻¹ by Gauss and Jordan's elimination, with row exchanges."""
+    n = matrices.shape[0]
+    row = jnp.arange(n)
+    identity = jnp.broadcast_to(jnp.eye(n, dtype=matrices.dtype)[..., None], matrices.shape)
+
+    def eliminate(j: Array, work: Array) -> Array:
+        column = work[:, j]
+        size = jnp.abs(jnp.real(column)) + jnp.abs(jnp.imag(column))
+        chosen = row[:, None] == jnp.argmax(jnp.where(row[:, None] >= j, size, -1.0), axis=0)
+        pivot_row = jnp.sum(jnp.where(chosen[:, None], work, 0.0), axis=0)
+        work = jnp.where(chosen[:, None], work[j], work)
+        pivot_row = pivot_row / pivot_row[j]
+        others = jnp.where((row == j)[:, None], 0.0, work[:, j])
+        return (work - others[:, None] * pivot_row).at[j].set(pivot_row)
+
+    return jax.lax.fori_loop(0, n, eliminate, jnp.concatenate([matrices, identity], axis=1))[:, n:]

@@ -18,6 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, PyTree
 
+from fitting.lapack import calls_lapack
 from fitting.objective import Objective, cost_of, equality_of, inequality_of, residual_of
 from fitting.solve import Solved, Solver, options_of, outcome
 from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt, BoundedState
@@ -102,7 +103,11 @@ def solve_lanes(
     count, size = task.start.shape
     if threads is None:
         threads = (os.cpu_count() or 1) if jax.default_backend() == "cpu" else 1
-        if threads > 1 and count > width and _calls_lapack(objective, combine, _rows(task, np.zeros(1, dtype=int))):
+        if (
+            threads > 1
+            and count > width
+            and calls_lapack(_evaluated, objective, combine, _rows(task, np.zeros(1, dtype=int)))
+        ):
             threads = 1
     ended = Ended(
         vector=np.full((count, size), np.nan),
@@ -166,49 +171,13 @@ def solve_lanes(
 _COMPILING = threading.Lock()
 
 
-_LAPACK = frozenset(
-    [
-        "lu",
-        "cholesky",
-        "qr",
-        "geqrf",
-        "geqp3",
-        "householder_product",
-        "eigh",
-        "eig",
-        "svd",
-        "schur",
-        "hessenberg",
-        "tridiagonal",
-        "tridiagonal_solve",
-        "triangular_solve",
-    ]
-)
-"""Primitives of JAX that are one call of LAPACK for each matrix of a batch."""
-
-
-def _calls_lapack(objective: Objective, combine: Combine | None, lanes: Task) -> bool:
-    """Whether a factorisation by LAPACK is part of the objective."""
-    arrays, rest = eqx.partition((objective, lanes), eqx.is_array)
-    traced = jax.make_jaxpr(lambda arrays: _evaluated(combine, *eqx.combine(arrays, rest)))(arrays)
-    return _mentions(traced.jaxpr)
-
-
 @eqx.filter_jit
-def _evaluated(combine: Combine | None, objective: Objective, lanes: Task) -> Any:
+def _evaluated(objective: Objective, combine: Combine | None, lanes: Task) -> Any:
     """All values of the first lane; compiled for the sake of the cache of traces."""
     lane = jax.tree.map(lambda leaf: leaf[0], lanes)
     own = objective if combine is None else combine(objective, lane.data)
     vector = jnp.asarray(lane.start)
     return residual_of(vector, own), equality_of(vector, own), inequality_of(vector, own)
-
-
-def _mentions(jaxpr: Any) -> bool:
-    for equation in jaxpr.eqns:
-        inner = jax.tree.leaves(list(equation.params.values()), is_leaf=lambda value: hasattr(value, "eqns"))
-        if equation.primitive.name in _LAPACK or any(_mentions(value) for value in inner if hasattr(value, "eqns")):
-            return True
-    return False
 
 
 class _Light(NamedTuple):

@@ -1,12 +1,16 @@
-"""Constitutive laws: friction as a function of speed, forces as a function of position."""
+"""Constitutive laws: friction as a function of speed, forces of position, stiffness and damping of load, backlash."""
 
 from twin.laws.asymmetric import AsymmetricFriction as AsymmetricFriction
+from twin.laws.backlash import Backlash as Backlash
 from twin.laws.coulomb import CoulombFriction as CoulombFriction
 from twin.laws.coulomb import CoulombViscousFriction as CoulombViscousFriction
 from twin.laws.dahl import DahlFriction as DahlFriction
 from twin.laws.dahl import DahlState as DahlState
 from twin.laws.friction import AbstractFriction as AbstractFriction
 from twin.laws.friction import AbstractStaticFriction as AbstractStaticFriction
+from twin.laws.load_dependent import AbstractLoadLaw as AbstractLoadLaw
+from twin.laws.load_dependent import HyperbolicDamping as HyperbolicDamping
+from twin.laws.load_dependent import RootStiffness as RootStiffness
 from twin.laws.lugre import LuGreFriction as LuGreFriction
 from twin.laws.lugre import LuGreState as LuGreState
 from twin.laws.position_force import AbstractPositionForce as AbstractPositionForce

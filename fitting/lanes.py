@@ -121,9 +121,11 @@ def solve_lanes(
         return ended
     lock, turn, best = threading.Lock(), iter(range(count)), {True: np.inf, False: np.inf}
 
+    failed = threading.Event()
+
     def take() -> int:
         with lock:
-            return next(turn, -1)
+            return -1 if failed.is_set() else next(turn, -1)
 
     def wanted(cost: float, converged: bool) -> bool:
         with lock:
@@ -131,6 +133,15 @@ def solve_lanes(
             return keep is not None and keep(cost, best[converged])
 
     def work() -> None:
+        # A thread does not inherit what its starter set for a while.
+        with jax.enable_x64(True):
+            try:
+                run()
+            except BaseException:
+                failed.set()
+                raise
+
+    def run() -> None:
         numbers = np.asarray([take() for _ in range(width)])
         fresh = np.ones(width, dtype=bool)
         lanes, carried = _rows(task, numbers), None
@@ -173,11 +184,15 @@ _COMPILING = threading.Lock()
 
 @eqx.filter_jit
 def _evaluated(objective: Objective, combine: Combine | None, lanes: Task) -> Any:
-    """All values of the first lane; compiled for the sake of the cache of traces."""
+    """All values of the first lane and their derivatives along a line; jitted for the sake of the cache of traces."""
     lane = jax.tree.map(lambda leaf: leaf[0], lanes)
     own = objective if combine is None else combine(objective, lane.data)
+
+    def values(vector: Array) -> Any:
+        return residual_of(vector, own), equality_of(vector, own), inequality_of(vector, own)
+
     vector = jnp.asarray(lane.start)
-    return residual_of(vector, own), equality_of(vector, own), inequality_of(vector, own)
+    return jax.jvp(values, (vector,), (jnp.ones_like(vector),))
 
 
 class _Light(NamedTuple):
@@ -213,7 +228,9 @@ def _init(solver: Solver, objective: Objective, combine: Combine | None, lane: T
 
 @eqx.filter_jit
 def _blank(solver: Solver, objective: Objective, combine: Combine | None, lanes: Task) -> tuple[Array, Any]:
-    return eqx.filter_vmap(partial(_init, solver, objective, combine))(lanes)
+    blank = eqx.filter_vmap(partial(_init, solver, objective, combine))(lanes)
+    # As `_advance` returns it, without weak types: one program then serves the first call and all others.
+    return jax.tree.map(lambda leaf: jax.lax.convert_element_type(leaf, leaf.dtype), blank)
 
 
 @eqx.filter_jit

@@ -165,7 +165,8 @@ def multistart(
         correlated: as in `fit`.
         variance: as in `fit`.
         width: fits that run in step.
-        threads: sets of lanes that run side by side; the number of cores by default.
+        threads: sets of lanes that run side by side. By default the number of cores, and one where the residual calls
+            LAPACK: two programs that do can wait for each other for ever.
 
     Returns:
         All ends, the minima, and the results kept.
@@ -179,6 +180,8 @@ def multistart(
         raise InputError(f"keep must be one of {', '.join(KEEP)}, but is {keep!r}.")
     constraints = tuple(constraints)
     solver = chosen_solver(solver, constraints)
+    if width < 1:
+        raise InputError(f"width must be at least 1, but is {width}.")
     if isinstance(starts, int):
         vectors = sample_starts(space, starts, sampler=sampler, seed=seed)
     else:

@@ -4,7 +4,10 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 from scipy import stats
 
 from fitting.constraints import AbstractConstraint
@@ -13,7 +16,7 @@ from fitting.objective import Objective
 from fitting.profile_search import ProfileSearch
 from fitting.residuals.residual import AbstractResidual
 from fitting.result import FitResult
-from fitting.solve import Solver
+from fitting.solve import Solver, linearised
 from twin._checks import InputError
 
 if TYPE_CHECKING:
@@ -92,7 +95,7 @@ def profile(
     residual: AbstractResidual,
     result: FitResult,
     *,
-    parameters: Iterable[str] | None = None,
+    parameters: str | Iterable[str] | None = None,
     level: float = 0.95,
     variance: str = "estimated",
     constraints: Sequence[AbstractConstraint] = (),
@@ -105,12 +108,14 @@ def profile(
 
     Each parameter is held at values around its estimate while all others are fitted again, all parameters and both
     sides as one batch. The interval ends where the cost says so: 2·(C - Ĉ)/s² = t² (D. M. Bates and D. G. Watts,
-    "Nonlinear Regression Analysis and Its Applications", 1988, section 6.1). Errors are taken to be independent.
+    "Nonlinear Regression Analysis and Its Applications", 1988, section 6.1). Errors are taken to be independent. With
+    robust losses, whose cost is no likelihood, s² is such that near the estimate the profile agrees with the fit's
+    standard error.
 
     Args:
         residual: the evidence that was fitted.
         result: the fit.
-        parameters: paths to profile; all if not given.
+        parameters: paths to profile, or one path; all if not given.
         level: confidence of the intervals, between 0 and 1.
         variance: "estimated" from the residual, or "known" where the weights are exact.
         constraints: as in the fit.
@@ -123,11 +128,13 @@ def profile(
         The profiles.
 
     Raises:
-        InputError: a fit that did not converge, a parameter that was not fitted, level outside (0, 1), no degrees of
-            freedom to estimate a variance from.
+        InputError: a fit that did not converge, evidence or constraints that are not those of the fit, a parameter
+            that was not fitted, level outside (0, 1), no degrees of freedom to estimate a variance from, robust losses
+            together with a known variance or constraints.
     """
     space = result.space
-    paths = tuple(space.paths if parameters is None else parameters)
+    parameters = (parameters,) if isinstance(parameters, str) else parameters
+    paths = tuple(dict.fromkeys(space.paths if parameters is None else parameters))
     for path in paths:
         result[path]
     if not 0 < level < 1:
@@ -139,11 +146,12 @@ def profile(
     if variance == "estimated" and result.degrees_of_freedom < 1:
         raise InputError('No data are left over to estimate a variance from. Use variance="known", or add data.')
     constraints = tuple(constraints)
+    objective = Objective(residual, result.model, space, constraints)
     search = ProfileSearch(
-        objective=Objective(residual, result.model, space, constraints),
+        objective=objective,
         result=result,
         indices=[space.paths.index(path) for path in paths],
-        square=1.0 if variance == "known" else 2 * result.cost / result.degrees_of_freedom,
+        squares=_squares(objective, result, variance),
         critical=_critical(level, None if variance == "known" else result.degrees_of_freedom),
         solver=chosen_solver(solver, constraints),
         max_steps=max_steps,
@@ -164,7 +172,43 @@ def profile(
     )
     if unsettled:
         message = f"{message} The search for the ends ran out of rounds at {', '.join(unsettled)}.".strip()
+    if lost := search.failing():
+        message = (
+            f"{message} Fits with {', '.join(lost)} held did not converge before the end of the interval was reached: "
+            "it is not known. Give more max_steps, or narrow the bounds to where the model can be evaluated."
+        ).strip()
     return ProfileResult(found, level, search.critical, lowest if fell else None, message)
+
+
+def _squares(objective: Objective, result: FitResult, variance: str) -> np.ndarray:
+    """Variance that a rise of the cost is measured by, for each parameter."""
+    values, curvature = _values(objective, jnp.asarray(result.scaled))
+    cost = 0.5 * float(jnp.sum(values**2))
+    if not abs(cost - result.cost) <= 1e-6 * max(cost, result.cost):
+        raise InputError(
+            f"This evidence gives the fit a cost of {cost:.6g}, but the fit had {result.cost:.6g}. Profile with the "
+            "residual that was fitted."
+        )
+    plain = 1.0 if variance == "known" else 2 * result.cost / result.degrees_of_freedom
+    if curvature is None:
+        return np.full(len(result.scaled), plain)
+    if variance == "known" or objective.constraints:
+        raise InputError('Robust losses are profiled with variance="estimated" and without constraints only.')
+    jacobian = np.asarray(_jacobian(objective, jnp.asarray(result.scaled)))
+    weights = np.concatenate([np.asarray(curvature), np.ones(len(jacobian) - len(curvature))])  # priors at the end
+    bent = np.diag(np.linalg.pinv(jacobian.T @ (jacobian * weights[:, None])))
+    squares = np.diag(result.scaled_covariance) / bent
+    return np.where(np.isfinite(squares) & (squares > 0), squares, plain)
+
+
+@eqx.filter_jit
+def _values(objective: Objective, vector: Array) -> tuple[Array, Array | None]:
+    return objective(vector)
+
+
+@eqx.filter_jit
+def _jacobian(objective: Objective, vector: Array) -> Array:
+    return linearised(objective, vector)[0]
 
 
 def _critical(level: float, freedom: int | None) -> float:

@@ -20,6 +20,7 @@ class Side:
         self.open = room <= 0
         self.done = self.open
         self.bracket = np.inf
+        self.failures = 0
 
     def note(self, shift: float, ratio: float, vector: np.ndarray) -> None:
         """Add a point; a fit that failed counts as not seen."""
@@ -77,13 +78,13 @@ class ProfileSearch:
         objective: Objective,
         result: FitResult,
         indices: list[int],
-        square: float,
+        squares: np.ndarray,
         critical: float,
         solver: Solver,
         max_steps: int,
     ):
         self.objective, self.result, self.indices = objective, result, indices
-        self.square, self.critical, self.solver, self.max_steps = square, critical, solver, max_steps
+        self.squares, self.critical, self.solver, self.max_steps = squares, critical, solver, max_steps
         self.lowest = result.cost
         space = result.space
         self.lower, self.upper = np.asarray(space.lower), np.asarray(space.upper)
@@ -110,6 +111,12 @@ class ProfileSearch:
         """Parameters of which an end is only known roughly."""
         paths = self.result.space.paths
         return list(dict.fromkeys(paths[side.index] for side in self.sides if not side.done))
+
+    def failing(self) -> list[str]:
+        """Parameters of which an end was not reached because fits with them held did not converge."""
+        paths = self.result.space.paths
+        lost = [s for s in self.sides if s.failures and s.end(self.critical) is None and s.shifts[-1] < s.room]
+        return list(dict.fromkeys(paths[side.index] for side in lost))
 
     def fill(self, points: int) -> None:
         """Points in between, for the picture."""
@@ -139,7 +146,9 @@ class ProfileSearch:
         for row, (side, shift) in enumerate(wanted):
             cost = ended.cost[row] if ended.success[row] else np.nan
             self.lowest = np.nanmin([self.lowest, cost])
-            rise = max(2 * (cost - self.result.cost) / self.square, 0.0) if np.isfinite(cost) else np.nan
+            square = self.squares[side.index]
+            rise = max(2 * (cost - self.result.cost) / square, 0.0) if np.isfinite(cost) else np.nan
+            side.failures += not np.isfinite(rise)
             side.note(shift, float(np.sqrt(rise)), ended.vector[row])
 
     def points(self, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

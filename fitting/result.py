@@ -220,6 +220,11 @@ class FitResult:
         Raises:
             InputError: file missing, damaged or not a saved result; model without the parameters.
         """
+        path = Path(path)
+        if not path.exists() and path.with_name(f"{path.name}.npz").exists():
+            path = path.with_name(f"{path.name}.npz")  # the ending that `save` added
+        if not path.exists():
+            raise InputError(f"{path} does not exist. Give the file that FitResult.save wrote.")
         try:
             with np.load(path, allow_pickle=False) as file:
                 head = json.loads(str(file["head"]))

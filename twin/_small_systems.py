@@ -23,7 +23,7 @@ def solve_many(
         right: B.
 
     Returns:
-        X; not finite where A is singular.
+        X; not finite, or huge by rounding, where A is singular.
     """
     if matrices.shape[0] > MOST:
         solution = jnp.linalg.solve(jnp.moveaxis(matrices, -1, 0), jnp.moveaxis(right, -1, 0))

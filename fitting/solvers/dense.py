@@ -12,7 +12,7 @@ def orthogonal_triangle(
 
     The first pass is shifted by 1e-12 (in normalised columns), so that no condition number breaks it; the second mends
     what that changed (Fukaya et al., SIAM J. Sci. Comput. 42, 2020, A477; Yamamoto et al., ETNA 44, 2015, 306). Up to
-    condition numbers of 1e13 steps and smallest singular values are as good as those by LAPACK.
+    condition numbers of 1e12 steps and smallest singular values are as good as those by LAPACK.
 
     LAPACK itself is not for batches: its batched factorisations wait for the thread pool that they run on, so that two
     threads in loops of them hang (trap 23). On 1000 matrices of (200, 9) this takes twice LAPACK's time, and half that

@@ -43,7 +43,7 @@ class LinearModel(eqx.Module):
         return largest / jnp.where(self.squares > 0, jnp.sqrt(self.squares), 1.0)
 
     def steps(self, weights: Float[Array, "variables"], radius: Float[Array, ""], guess: Float[Array, ""]) -> "Steps":
-        """The Gauss-Newton step, and the best step no longer than a radius.
+        """The Gauss-Newton step, and the best step about as long as a radius, if the former is longer.
 
         The latter is the damped step min ‖r + J·s‖² + λ‖weights·z‖² whose length meets the radius. 1/length is nearly
         linear in λ (Hebden 1973; Moré, "The Levenberg-Marquardt algorithm", 1978), so that a secant from the

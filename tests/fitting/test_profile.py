@@ -7,6 +7,8 @@ from scipy import stats
 
 from fitting.fit import fit
 from fitting.profile import profile
+from fitting.residuals.losses import HuberLoss
+from fitting.residuals.robust import RobustResidual
 from tests.fitting.curves import Coefficients, CurveResidual, box, line, noisy, saturation
 from twin._checks import InputError
 from twin.parameters import Parameter, ParameterSpace
@@ -93,3 +95,37 @@ def test_intervals_hold_the_truth_where_those_of_linear_theory_do_not():
         likelihood += below <= truth[0] <= above
     assert 0.93 <= likelihood / repeats <= 0.97
     assert linear / repeats < 0.88
+
+
+def test_a_profile_of_a_robust_fit_agrees_with_its_standard_errors():
+    """A straight line with gross outliers: the profile is that of the sandwich covariance, not of the inflated cost."""
+    plain = noisy(line, [1.0, 2.0], np.linspace(0, 1, 60), 0.1)
+    far = np.zeros(60)
+    far[[5, 20, 41]] = 3.0
+    evidence = RobustResidual(CurveResidual(line, plain.x, np.asarray(plain.y) + far, plain.deviation), HuberLoss())
+    result = fit(evidence, Coefficients(jnp.asarray([0.0, 0.0])), box(2, -100.0, 100.0))
+    found = profile(evidence, result, points=0)
+    for i, path in enumerate(("b.0", "b.1")):
+        np.testing.assert_allclose(found[path].interval, result.intervals()[i], atol=0.25 * result.standard_errors[i])
+    with pytest.raises(InputError, match="Robust"):
+        profile(evidence, result, variance="known")
+
+
+def test_evidence_that_was_not_fitted_is_refused():
+    evidence = noisy(line, [1.0, 2.0], np.linspace(0, 1, 30), 0.1)
+    result = fit(evidence, Coefficients(jnp.asarray([0.0, 0.0])), box(2, -100.0, 100.0))
+    with pytest.raises(InputError, match="residual that was fitted"):
+        profile(noisy(line, [1.0, 2.0], np.linspace(0, 1, 30), 0.1, seed=1), result)
+
+
+def ends_at_two(b, x):
+    """A line that cannot be evaluated where its first coefficient is above 2."""
+    return jnp.where(b[0] > 2.0, jnp.nan, line(b, x))
+
+
+def test_an_end_that_cannot_be_reached_is_said_to_be_unknown():
+    evidence = noisy(ends_at_two, [1.9, 2.0], np.linspace(0, 1, 10), 0.5)
+    result = fit(evidence, Coefficients(jnp.asarray([1.0, 1.0])), box(2, -100.0, 100.0), variance="known")
+    found = profile(evidence, result, parameters="b.0", variance="known", points=0)
+    assert found["b.0"].open == (False, True)
+    assert "b.0 held did not converge" in found.message

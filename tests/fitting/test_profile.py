@@ -124,7 +124,7 @@ def ends_at_two(b, x):
 
 
 def test_an_end_that_cannot_be_reached_is_said_to_be_unknown():
-    evidence = noisy(ends_at_two, [1.9, 2.0], np.linspace(0, 1, 10), 0.5)
+    evidence = noisy(ends_at_two, [1.0, 2.0], np.linspace(0, 1, 10), 1.0)
     result = fit(evidence, Coefficients(jnp.asarray([1.0, 1.0])), box(2, -100.0, 100.0), variance="known")
     found = profile(evidence, result, parameters="b.0", variance="known", points=0)
     assert found["b.0"].open == (False, True)

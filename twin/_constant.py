@@ -11,7 +11,7 @@ from twin._recursion import run_recursion
 from twin.control.closed_loop import SampledLoop
 from twin.plant import AbstractPlant
 from twin.references import AbstractReference
-from twin.stepping import ConstantSteps, runge_kutta_steps
+from twin.stepping import ConstantSteps, runge_kutta_steps, stage_times
 
 
 def solve_constant(
@@ -22,18 +22,19 @@ def solve_constant(
     stepping: ConstantSteps,
 ) -> tuple[PyTree[Array], Float[Array, ""]]:
     """States at the times, and the error estimate relative to the tolerance."""
-    parameters, fixed = eqx.partition((plant, reference), eqx.is_inexact_array)
+    parameters, fixed = eqx.partition(plant, eqx.is_inexact_array)
+    begin, length = times[:-1], jnp.diff(times)
+    # For all stages of all steps at once: inside the loop the reference would be evaluated one by one.
+    inputs = jax.vmap(jax.vmap(jax.vmap(reference)))(
+        jax.vmap(lambda *span: stage_times(stepping, *span))(begin, length)
+    )
 
-    def step(parameters: PyTree[Array], x: PyTree[Array], span: tuple[Array, Array]) -> tuple[Any, Any]:
-        plant, reference = eqx.combine(parameters, fixed)
-        begin, end = span
+    def step(parameters: PyTree[Array], x: PyTree[Array], item: tuple[Array, Array, Any]) -> tuple[Any, Any]:
+        plant = eqx.combine(parameters, fixed)
+        start, span, inputs = item
+        return runge_kutta_steps(stepping, plant.vector_field, start, span, x, inputs)
 
-        def field(t: Array, y: PyTree[Array]) -> PyTree[Array]:
-            return plant.vector_field(t, y, reference(t))
-
-        return runge_kutta_steps(stepping, field, begin, end - begin, x)
-
-    before, last, errors = run_recursion(step, parameters, state, (times[:-1], times[1:]))
+    before, last, errors = run_recursion(step, parameters, state, (begin, length, inputs))
     states = jax.tree.map(lambda rows, end: jnp.concatenate([rows, end[None]]), before, last)
     return states, _relative_error(stepping, errors, states)
 
@@ -61,7 +62,7 @@ def run_sampled_loop(
         loop = eqx.combine(parameters, fixed)
         state, memory, inputs = tick(loop, x, item)
 
-        def field(time: Array, y: PyTree[Array]) -> PyTree[Array]:
+        def field(time: Array, y: PyTree[Array], _: None) -> PyTree[Array]:
             return loop.plant.vector_field(time, y, inputs)
 
         after, error = runge_kutta_steps(stepping, field, item[0], loop.period, state)

@@ -67,8 +67,25 @@ class AdaptiveSteps(AbstractStepping):
             raise InputError(f'gradient must be "forward" or "reverse", but is {self.gradient!r}.')
 
 
+def stage_times(stepping: ConstantSteps, start: Array, length: Array) -> Float[Array, "substeps stages"]:
+    """The times at which `runge_kutta_steps` asks for the vector field [s].
+
+    Args:
+        stepping: number of steps, and the diffrax method whose tableau is used.
+        start: time at the start [s].
+        length: length of all steps together [s].
+    """
+    nodes = np.concatenate([[0.0], np.asarray(stepping.solver.tableau.c)])
+    return start + length / stepping.substeps * (np.arange(stepping.substeps)[:, None] + nodes)
+
+
 def runge_kutta_steps(
-    stepping: ConstantSteps, vector_field: Callable, start: Array, length: Array, state: PyTree[Array]
+    stepping: ConstantSteps,
+    vector_field: Callable,
+    start: Array,
+    length: Array,
+    state: PyTree[Array],
+    inputs: PyTree[Array] = None,
 ) -> tuple[PyTree[Array], PyTree[Array]]:
     """Explicit Runge-Kutta steps of equal length, with the stages written out.
 
@@ -77,10 +94,12 @@ def runge_kutta_steps(
 
     Args:
         stepping: number of steps, and the diffrax method whose tableau is used.
-        vector_field: function of (t, state).
+        vector_field: function of (t, state, inputs).
         start: time at the start [s].
         length: length of all steps together [s].
         state: state at the start.
+        inputs: what the vector field gets at the `stage_times`, arrays with leading axes (substeps, stages); if it is
+            the same throughout, leave it out.
 
     Returns:
         The state at the end, and the sum of the magnitudes of the embedded estimates of the local errors, in the same
@@ -88,23 +107,30 @@ def runge_kutta_steps(
     """
     tableau: Any = stepping.solver.tableau
     step = length / stepping.substeps
+    nodes = np.concatenate([[0.0], np.asarray(tableau.c)])
 
-    def one(carry: Any, i: Any) -> tuple[Any, None]:
-        state, first, total = carry
-        t = start + i * step
-        stages = [first]
-        for row, node in zip(tableau.a_lower, tableau.c, strict=True):
-            stages.append(vector_field(t + float(node) * step, _advance(state, step, row, stages)))
+    def one(carry: Any, item: Any) -> tuple[Any, None]:
+        state, last, total = carry
+        i, given = item
+
+        def rate(stage: int, y: PyTree[Array]) -> PyTree[Array]:
+            at = jax.tree.map(lambda rows: rows[stage], given)
+            return vector_field(start + (i + nodes[stage]) * step, y, at)
+
+        stages = [last if tableau.fsal else rate(0, state)]
+        for stage, row in enumerate(tableau.a_lower, start=1):
+            stages.append(rate(stage, _advance(state, step, row, stages)))
         state = _advance(state, step, tableau.b_sol, stages)
         error = jax.lax.stop_gradient(_combine(step, tableau.b_error, stages))
         total = jax.tree.map(lambda sum_, e: sum_ + jnp.abs(e), total, error)
-        return (state, stages[-1] if tableau.fsal else vector_field(t + step, state), total), None
+        return (state, stages[-1], total), None
 
-    carry = (state, vector_field(start, state), jax.tree.map(jnp.zeros_like, state))
+    first = vector_field(start, state, jax.tree.map(lambda rows: rows[0, 0], inputs))
+    carry = (state, first, jax.tree.map(jnp.zeros_like, state))
     if stepping.substeps == 1:
-        carry, _ = one(carry, 0)
+        carry, _ = one(carry, (0, jax.tree.map(lambda rows: rows[0], inputs)))
     else:
-        carry, _ = jax.lax.scan(one, carry, jnp.arange(stepping.substeps))
+        carry, _ = jax.lax.scan(one, carry, (jnp.arange(stepping.substeps), inputs))
     return carry[0], carry[2]
 
 

@@ -49,7 +49,8 @@ class LaggedActuator(AbstractPlant):
         return LaggedActuatorState(self.plant.vector_field(t, state.plant, self._behind(state, inputs)), lag)
 
     def outputs(self, t: Float[Array, ""], state: Any, inputs: Any) -> Any:
-        return self.plant.outputs(t, state.plant, self._behind(state, inputs))._replace(command=inputs.command)
+        outputs = self.plant.outputs(t, state.plant, self._behind(state, inputs))
+        return outputs._replace(command=inputs.command) if "command" in outputs._fields else outputs
 
     def _behind(self, state: Any, inputs: Any) -> Any:
         return inputs._replace(command=state.actual)

@@ -13,6 +13,9 @@ from twin.laws.load_dependent import HyperbolicDamping as HyperbolicDamping
 from twin.laws.load_dependent import RootStiffness as RootStiffness
 from twin.laws.lugre import LuGreFriction as LuGreFriction
 from twin.laws.lugre import LuGreState as LuGreState
+from twin.laws.mesh import AbstractMesh as AbstractMesh
+from twin.laws.mesh import SecantMesh as SecantMesh
+from twin.laws.mesh import TangentMesh as TangentMesh
 from twin.laws.position_force import AbstractPositionForce as AbstractPositionForce
 from twin.laws.position_force import ConstantForce as ConstantForce
 from twin.laws.position_force import HarmonicForce as HarmonicForce
@@ -20,6 +23,7 @@ from twin.laws.position_force import NoForce as NoForce
 from twin.laws.position_force import PolynomialForce as PolynomialForce
 from twin.laws.position_force import SumForce as SumForce
 from twin.laws.smooth import smooth_abs as smooth_abs
+from twin.laws.smooth import smooth_clip as smooth_clip
 from twin.laws.smooth import smooth_power as smooth_power
 from twin.laws.smooth import smooth_sign as smooth_sign
 from twin.laws.stribeck import StribeckFriction as StribeckFriction

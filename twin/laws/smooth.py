@@ -61,6 +61,24 @@ def smooth_power(
     return smooth_sign(value, width) ** 2 * smooth_abs(value, width) ** exponent
 
 
+def smooth_clip(
+    value: Float[ArrayLike, "*batch"], limit: Float[ArrayLike, ""], width: Float[ArrayLike, ""]
+) -> Float[Array, "*batch"]:
+    """A value within ±limit: ½·(√((v + L)² + w²) - √((v - L)² + w²)), odd, increasing, never beyond the limit.
+
+    Args:
+        value: v, any shape, any unit.
+        limit: L, positive and finite, in the unit of v.
+        width: w, positive, in the unit of v: how far before the limit the curve begins to bend.
+
+    Returns:
+        The limited value in the shape of v.
+    """
+    v = jnp.asarray(value)
+    # The difference of the two roots without cancellation.
+    return 2 * limit * v / (smooth_abs(v + limit, width) + smooth_abs(v - limit, width))
+
+
 def _guarded(value: ArrayLike, width: ArrayLike) -> tuple[Array, Array, Array]:
     # What is not selected must not overflow either: its derivative would be infinity times zero.
     sharp = jnp.abs(value) > _SHARP * width

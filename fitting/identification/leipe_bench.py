@@ -1,0 +1,148 @@
+"""A stand-in for the bench of Leipe et al.: a simulated drive that is richer than any model fitted to its records.
+
+It has what a model will not know: friction that rises towards standstill, cogging, encoders of finite resolution, a
+controller that answers one tick late, current loops, noise. Stiffness and damping are the published ones (eq. 6, 10).
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from twin.control import CascadeGains, CurrentLoop, Encoders, SampledLoop, SampledPreloadCascade
+from twin.drives import RackPinionDrive, leipe_drive
+from twin.drives.leipe import RATED_TORQUE, TORQUE_LIMIT
+from twin.laws import HarmonicForce, StribeckFriction
+from twin.record import Record
+from twin.references import AbstractReference
+from twin.simulation import simulate
+from twin.stepping import ConstantSteps
+
+PERIOD = 250e-6
+"""Period of the velocity controllers [s]; records hold every tick."""
+STEPPING = ConstantSteps(substeps=1)
+"""One step a tick: no mode of the drive or of its current loops is faster."""
+CHANNELS = {
+    "position_1": "m",
+    "position_2": "m",
+    "table_position": "m",
+    "torque_1": "N m",
+    "torque_2": "N m",
+}
+"""What the bench records."""
+TORQUE_NOISE = 0.02
+"""Standard deviation of the noise on the torques, from the currents [Nm]."""
+
+
+def bench_gains(preload_percent: float | Array) -> CascadeGains:
+    """Settings of the cascade; chosen, as none are published.
+
+    Args:
+        preload_percent: preload in per cent of the rated torque.
+
+    Raises:
+        InputError: a preload beyond the rated torque.
+    """
+    return CascadeGains(
+        position_gain=25.0,
+        velocity_gain=700.0,
+        reset_time=0.02,
+        preload_gain=5e-4,
+        preload=RATED_TORQUE * preload_percent / 100,
+        rated_torque=RATED_TORQUE,
+        torque_limit=TORQUE_LIMIT,
+        acceleration_feedforward=0.0,
+    )
+
+
+def bench_loop(drive: RackPinionDrive, gains: CascadeGains, *, delayed: bool) -> SampledLoop:
+    """A drive under the bench's sampled cascade and current loops.
+
+    Args:
+        drive: the drive.
+        gains: settings of the cascade.
+        delayed: whether torques act one tick late.
+    """
+    currents = CurrentLoop.tuned(
+        drive, torque_constant=1.5, resistance=1.0, inductance=0.01, bandwidth=400.0, voltage_limit=300.0
+    )
+    return SampledLoop(currents, SampledPreloadCascade(gains, position_every=4, delayed=delayed), PERIOD)
+
+
+def bench_drive() -> RackPinionDrive:
+    """The richer drive: friction that rises towards standstill, and cogging of motors and gears."""
+    drive = leipe_drive()
+    trains = []
+    for train, phase in ((drive.train_1, 0.4), (drive.train_2, 2.1)):
+        friction = StribeckFriction(
+            coulomb=0.14, static=0.2, stribeck_velocity=0.5, viscous=5e-4, width=0.05, exponent=1.0
+        )
+        # Five pole pairs, and six times as many slots.
+        cogging = HarmonicForce(2 * np.pi / 5, [0.05, 0, 0, 0, 0, 0.04], [0.0] * 6, origin=phase)
+        trains.append(dataclasses.replace(train, friction=friction, cogging=cogging))
+    guides = StribeckFriction(
+        coulomb=110.0, static=160.0, stribeck_velocity=1e-3, viscous=300.0, width=2e-4, exponent=2.0
+    )
+    return dataclasses.replace(drive, train_1=trains[0], train_2=trains[1], table_friction=guides)
+
+
+def bench(preload_percent: float) -> SampledLoop:
+    """The whole bench at a preload.
+
+    Args:
+        preload_percent: preload in per cent of the rated torque.
+
+    Raises:
+        InputError: a preload beyond the rated torque.
+    """
+    loop = bench_loop(bench_drive(), bench_gains(preload_percent), delayed=True)
+    # Motor encoders of 24 bit behind a ratio of 2.65 mm/rad, and a scale of 0.1 µm.
+    motor = float(2 * np.pi / 2**24 * bench_drive().travel_per_radian)
+    encoders = Encoders(loop.plant, {"position_1": motor, "position_2": motor, "table_position": 1e-7})
+    return dataclasses.replace(loop, plant=encoders)
+
+
+class Measurement(eqx.Module):
+    """What a bench recorded, and what only a simulated one can tell."""
+
+    record: Record
+    """The record: positions of both motors and the table, both torques."""
+    forces: Float[Array, "2 samples"]
+    """True forces through the meshes [N]."""
+
+
+def measure(
+    preload_percents: Sequence[float], reference: AbstractReference, duration: float, *, seed: int
+) -> list[Measurement]:
+    """Records of one motion at several preloads, with noise.
+
+    Args:
+        preload_percents: preloads in per cent of the rated torque.
+        reference: the motion.
+        duration: length of each record [s].
+        seed: of the noise.
+
+    Raises:
+        InputError: a preload beyond the rated torque.
+    """
+    times = jnp.arange(round(duration / PERIOD)) * PERIOD
+    random = np.random.default_rng(seed)
+    found = []
+    for percent in preload_percents:
+        outputs = _run(bench(percent), reference, times)
+        channels = {name: np.asarray(getattr(outputs, name)) for name in CHANNELS}
+        for name in ("torque_1", "torque_2"):
+            channels[name] = channels[name] + TORQUE_NOISE * random.standard_normal(times.size)
+        record = Record.create(np.asarray(times), channels, CHANNELS, name=f"bench at {percent:g} % preload")
+        found.append(Measurement(record, jnp.stack([outputs.force_1, outputs.force_2])))
+    return found
+
+
+@eqx.filter_jit
+def _run(loop: SampledLoop, reference: AbstractReference, times: Array):
+    trajectory = simulate(loop, reference, times, stepping=STEPPING)
+    return jax.tree.map(jnp.asarray, trajectory.outputs)

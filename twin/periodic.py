@@ -8,12 +8,12 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Complex, Float
 
 from twin._checks import InputError, increasing, require_x64
+from twin._sample_rate import uniform_rate
 from twin.frf import FRF
 from twin.record import Record
 
-# How far a line may miss a whole number of cycles per period, and a sample its place in the grid, by rounding.
+# How far a line may miss a whole number of cycles per period by rounding.
 _LINE_ROUNDING = 1e-3
-_GRID_ROUNDING = 1e-2
 # Periods that agree to rounding have no scatter to compare with.
 _AGREEMENT = 1e-9
 
@@ -85,7 +85,7 @@ def periodic_spectra(
     require_x64()
     if detrend not in ("ramp", "none"):
         raise InputError(f'detrend must be "ramp" or "none", but is {detrend!r}. Choose one of the two.')
-    rate = _uniform_rate(record)
+    rate = uniform_rate(record)
     lines = _lines(frequency, period_samples, rate)
     closing = 1 if detrend == "ramp" else 0
     samples = np.stack([np.asarray(record.channel(name)) for name in channels])
@@ -195,18 +195,6 @@ def distortion_level(
     y = jnp.stack([jnp.mean(silent[name], axis=0) for name in responses])
     beside = jnp.interp(silent.frequency, excited.frequency, jnp.abs(jnp.mean(excited[excitation], axis=0)))
     return jnp.abs(y - g * u) / (jnp.abs(g) * beside)
-
-
-def _uniform_rate(record: Record) -> float:
-    times = np.asarray(record.times)
-    step = (times[-1] - times[0]) / (times.size - 1)
-    miss = np.abs(times - times[0] - step * np.arange(times.size)).max()
-    if miss > _GRID_ROUNDING * step:
-        raise InputError(
-            f"{record.name} is not sampled uniformly: a sample lies {miss:g} s from its place in a grid of {step:g} s. "
-            "Resample it before taking spectra."
-        )
-    return 1 / step
 
 
 def _lines(frequency: Float[ArrayLike, "lines"], period_samples: int, rate: float) -> np.ndarray:

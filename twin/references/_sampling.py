@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from twin._checks import InputError, increasing, is_concrete
+from twin._checks import InputError, increasing, is_concrete, positive
 
 # A guess by division is put right by one sample at most; a sample may therefore lie this part of a period off the grid.
 _JITTER = 0.25
@@ -87,4 +87,18 @@ def check_shape(name: str, value: object, samples: int) -> None:
         raise InputError(
             f"{name} must have one entry for each of the {samples} times, but has the shape {shape}. "
             "Check that both come from the same record."
+        )
+
+
+def check_below_nyquist(what: str, frequency: float | Float[Array, ""], sample_rate: float) -> None:
+    """Raise unless a frequency [Hz] lies below half of a sample rate [Hz].
+
+    Raises:
+        InputError: if it does not, or the sample rate is not positive.
+    """
+    positive("sample_rate", sample_rate, "Hz")
+    if not float(frequency) < sample_rate / 2:
+        raise InputError(
+            f"{what} reaches {float(frequency):g} Hz, beyond Nyquist: half the sample rate of {sample_rate:g} Hz is "
+            f"{sample_rate / 2:g} Hz. Lower the highest frequency or sample faster."
         )

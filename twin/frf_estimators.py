@@ -68,7 +68,7 @@ def estimate_frf(
     Every pair is estimated on its own, as if the other inputs were silent. Inputs that act at the same time and are
     correlated are not told apart.
 
-    The defaults are those of C. Leipe et al. for a rack-and-pinion drive: Hamming windows of 1024 samples which overlap
+    The defaults are those of V. Leipe et al. for a rack-and-pinion drive: Hamming windows of 1024 samples which overlap
     by 717, and H3. A resonance narrower than about two lines (twice sample rate/samples) is flattened by leakage, which
     the variance does not show.
 

@@ -75,7 +75,8 @@ def stage_times(stepping: ConstantSteps, start: Array, length: Array) -> Float[A
         start: time at the start [s].
         length: length of all steps together [s].
     """
-    nodes = np.concatenate([[0.0], np.asarray(stepping.solver.tableau.c)])
+    tableau: Any = stepping.solver.tableau
+    nodes = np.concatenate([[0.0], np.asarray(tableau.c)])
     return start + length / stepping.substeps * (np.arange(stepping.substeps)[:, None] + nodes)
 
 

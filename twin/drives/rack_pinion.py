@@ -156,7 +156,12 @@ class RackPinionDrive(AbstractPlant):
         """At rest at zero, both pinions in the middle of their play."""
         zero = jnp.zeros(())
         return RackPinionState(
-            *(zero,) * 6,
+            zero,
+            zero,
+            zero,
+            zero,
+            zero,
+            zero,
             self.train_1.friction.initial_state(),
             self.train_2.friction.initial_state(),
             self.table_friction.initial_state(),

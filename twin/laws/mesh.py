@@ -28,8 +28,8 @@ class AbstractMesh(eqx.Module):
     odd: the mirrored deflection gives the mirrored force.
     """
 
-    stiffness: eqx.AbstractVar[AbstractLoadLaw]
-    """Stiffness of the flanks in contact k(F) [N/m]."""
+    stiffness: eqx.AbstractVar[Any]
+    """Stiffness of the flanks in contact k(F), a load law [N/m]."""
     damping: eqx.AbstractVar[AbstractLoadLaw]
     """Damping of the flanks in contact d(F) [Ns/m]."""
     backlash: eqx.AbstractVar[Backlash]

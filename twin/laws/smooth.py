@@ -76,7 +76,7 @@ def smooth_clip(
     """
     v = jnp.asarray(value)
     # The difference of the two roots without cancellation.
-    return 2 * limit * v / (smooth_abs(v + limit, width) + smooth_abs(v - limit, width))
+    return jnp.asarray(2 * limit * v) / (smooth_abs(v + limit, width) + smooth_abs(v - limit, width))
 
 
 def _guarded(value: ArrayLike, width: ArrayLike) -> tuple[Array, Array, Array]:

@@ -57,6 +57,22 @@ def constraint_values(
     return jnp.concatenate([jnp.zeros(0), *values])
 
 
+def all_constraints(constraints: Any) -> tuple[AbstractConstraint, ...]:
+    """The constraints that a caller gave, as a tuple.
+
+    Args:
+        constraints: any number of constraints, one after the other.
+
+    Raises:
+        InputError: a constraint by itself.
+    """
+    if isinstance(constraints, AbstractConstraint):
+        raise InputError(
+            f"constraints is a single {type(constraints).__name__}. Put it into a list: constraints=[constraint]."
+        )
+    return tuple(constraints)
+
+
 def check_constraints(constraints: Sequence[AbstractConstraint], model: Any) -> None:
     """Raise unless every constraint is a function of the model that returns real numbers, one or a vector.
 

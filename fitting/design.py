@@ -4,11 +4,10 @@ import dataclasses
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Float
+from jaxtyping import Array
 
 from fitting.identifiability import plausible_range
 from fitting.objective import Objective
@@ -52,8 +51,8 @@ class ExperimentRanking:
         import pandas as pd
 
         table = pd.DataFrame({"gain of ln det": self.gains, "share of effort": self.effort}, index=list(self.names))
-        for i, (path, unit) in enumerate(zip(self.space.paths, self.space.units, strict=True)):
-            table[f"s.e. of {path}" + (f" [{unit}]" if unit else "")] = self.standard_errors[:, i]
+        for parameter, errors in zip(self.space.parameters, self.standard_errors.T, strict=True):
+            table[f"s.e. of {parameter.label}"] = errors
         table.index.name = "experiment"
         return table
 
@@ -87,7 +86,7 @@ def rank_experiments(result: FitResult, candidates: Mapping[str, AbstractResidua
     space, vector = result.space, jnp.asarray(result.scaled)
     information = []
     for name, residual in candidates.items():
-        jacobian = np.asarray(_jacobian(Objective(residual, result.model, space), vector))
+        jacobian = np.asarray(linearised(Objective(residual, result.model, space), vector)[0])
         priors = sum(p.prior is not None for p in space.parameters)
         rows = jacobian[: len(jacobian) - priors]
         if not np.all(np.isfinite(rows)):
@@ -95,8 +94,7 @@ def rank_experiments(result: FitResult, candidates: Mapping[str, AbstractResidua
                 f"Candidate {name!r} has no finite Jacobian at the fit. Simulate it with the fitted model."
             )
         information.append(rows.T @ rows)
-    deviation = 1.0 if result.variance == "known" else result.rms
-    known = result.factor.T @ result.factor / deviation**2 if np.all(np.isfinite(result.factor)) else 0.0
+    known = result.factor.T @ result.factor / result.deviation**2 if np.all(np.isfinite(result.factor)) else 0.0
     known = known + np.diag(
         [1 / plausible_range(p, x) ** 2 for p, x in zip(space.parameters, result.scaled, strict=True)]
     )
@@ -115,11 +113,6 @@ def rank_experiments(result: FitResult, candidates: Mapping[str, AbstractResidua
         standard_errors=spreads * np.abs(np.asarray(space.slopes(jnp.asarray(result.values)))),
         space=space,
     )
-
-
-@eqx.filter_jit
-def _jacobian(objective: Objective, vector: Float[Array, "parameters"]) -> Float[Array, "rows parameters"]:
-    return linearised(objective, vector)[0]
 
 
 def _optimal_effort(known: np.ndarray, information: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from fitting.constraints import AbstractConstraint, check_constraints
+from fitting.constraints import AbstractConstraint, all_constraints, check_constraints
 from fitting.residuals.residual import AbstractResidual
 from fitting.result import FitResult
 from fitting.solve import Solved, Solver, solve
@@ -65,7 +65,7 @@ def fit(
     """
     require_x64()
     space.check_start(model)
-    constraints = tuple(constraints)
+    constraints = all_constraints(constraints)
     solver = chosen_solver(solver, constraints)
     check_residual(residual, model, space)
     check_constraints(constraints, model)
@@ -99,14 +99,18 @@ def result_of(
         correlated: as in `fit`.
         variance: as in `fit`.
     """
+    residual, jacobian, stop = np.asarray(solved.residual), np.asarray(solved.jacobian), name_of(solved.reason)
+    if stop == "not_finite":
+        # A solver may leave there what it was made with: zeros, which would look like a perfect fit.
+        residual, jacobian = np.full_like(residual, np.nan), np.full_like(jacobian, np.nan)
     history = np.asarray(solved.history)
     values = space.unscaled(solved.vector)
     held = set(hold)
     priors = sum(p.prior is not None for p in space.parameters)
     free = np.flatnonzero([path not in held for path in space.paths])
     covariance = covariance_of(
-        solved.residual,
-        np.asarray(solved.jacobian)[:, free],
+        residual,
+        jacobian[:, free],
         np.asarray(solved.active)[free],
         series=correlated,
         priors=priors,
@@ -120,15 +124,15 @@ def result_of(
         values=np.asarray(values)[free],
         scaled=np.asarray(solved.vector)[free],
         scaled_covariance=covariance.matrix,
-        factor=_factor(np.asarray(solved.jacobian)[:, free]),
+        factor=_factor(jacobian[:, free]),
         condition_number=covariance.condition_number,
         degrees_of_freedom=covariance.degrees_of_freedom,
         unseen=covariance.unseen,
         active=np.asarray(solved.active)[free],
-        residual=np.asarray(solved.residual),
+        residual=residual,
         cost_history=history[np.isfinite(history)],
         steps=int(solved.steps),
-        stop=name_of(solved.reason),
+        stop=stop,
         offset=float(solved.offset),
         variance=variance,
     )

@@ -134,11 +134,10 @@ def identifiability(result: FitResult, *, limit: float = 0.25) -> Identifiabilit
         raise InputError("This fit has no finite Jacobian, so nothing can be said. " + result.message)
     names = result.space.paths
     free = [int(i) for i in np.flatnonzero(~result.active)]
-    deviation = 1.0 if result.variance == "known" else result.rms
     norms = np.linalg.norm(result.factor, axis=0)
     ranges = np.asarray([plausible_range(p, x) for p, x in zip(result.space.parameters, result.scaled, strict=True)])
     with np.errstate(divide="ignore"):
-        alone = np.where(norms > 0, deviation / norms, np.inf) / ranges
+        alone = np.where(norms > 0, result.deviation / norms, np.inf) / ranges
 
     seen = [i for i in free if norms[i] > 0]
     # Parameters whose data are pure rounding beside others' would make every direction they are in look weak.

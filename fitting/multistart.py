@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 from scipy import stats
 
-from fitting.constraints import AbstractConstraint, check_constraints
+from fitting.constraints import AbstractConstraint, all_constraints, check_constraints
 from fitting.fit import check_residual, chosen_solver, result_of
 from fitting.lanes import WIDTH, Ended, Task, solve_lanes
 from fitting.objective import Objective
@@ -108,7 +108,7 @@ class MultistartResult:
             members = np.flatnonzero(self.clusters == cluster)
             lowest = members[np.argmin(self.costs[members])]
             rows.append([self.costs[lowest], members.size, int(lowest), *self.values[lowest]])
-        names = [f"{p.path} [{p.unit}]" if p.unit else p.path for p in self.space.parameters]
+        names = [p.label for p in self.space.parameters]
         return pd.DataFrame(rows, columns=["cost", "starts", "lowest start", *names])
 
     def to_dataframe(self) -> "pd.DataFrame":
@@ -132,7 +132,7 @@ def multistart(
     model: Any,
     space: ParameterSpace,
     *,
-    starts: int | Float[ArrayLike, "starts parameters"] = 100,
+    starts: int | np.integer | Float[ArrayLike, "starts parameters"] = 100,
     sampler: str = "sobol",
     seed: int = 1,
     constraints: Sequence[AbstractConstraint] = (),
@@ -178,12 +178,12 @@ def multistart(
     require_x64()
     if keep not in KEEP:
         raise InputError(f"keep must be one of {', '.join(KEEP)}, but is {keep!r}.")
-    constraints = tuple(constraints)
+    constraints = all_constraints(constraints)
     solver = chosen_solver(solver, constraints)
     if width < 1:
         raise InputError(f"width must be at least 1, but is {width}.")
-    if isinstance(starts, int):
-        vectors = sample_starts(space, starts, sampler=sampler, seed=seed)
+    if isinstance(starts, int | np.integer):
+        vectors = sample_starts(space, int(starts), sampler=sampler, seed=seed)
     else:
         vectors = _given(np.asarray(starts, dtype=float), space)
     outside = ~np.all((vectors >= np.asarray(space.lower)) & (vectors <= np.asarray(space.upper)), axis=1)

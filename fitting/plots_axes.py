@@ -1,4 +1,4 @@
-"""What the plots of this room share: new axes, grids of them, and labels of parameters."""
+"""What the plots of this room share: new axes, grids of them, and the scales of parameters."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -57,15 +57,6 @@ def grid_or_new(
     for unused in grid[count:]:
         unused.remove()
     return grid[:count]
-
-
-def label_of(parameter: Parameter) -> str:
-    """Name and unit of a parameter.
-
-    Args:
-        parameter: a free parameter.
-    """
-    return f"{parameter.path} [{parameter.unit}]" if parameter.unit else parameter.path
 
 
 def is_wide(parameter: Parameter, values: np.ndarray) -> bool:

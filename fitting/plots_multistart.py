@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fitting.multistart import MultistartResult
-from fitting.plots_axes import axes_or_new, label_of
+from fitting.plots_axes import axes_or_new
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,9 +57,7 @@ def plot_parallel(result: MultistartResult, *, ax: "Axes | None" = None) -> "Axe
     """
     count = len(result.space)
     ax = axes_or_new(ax, (7.0, 1.6 + 0.5 * count))
-    scaled = np.stack(
-        [np.asarray(p.to_scaled(v)) for p, v in zip(result.space.parameters, result.values.T, strict=True)], axis=1
-    )
+    scaled = result.space.scaled_rows(result.values)
     lower, upper = np.asarray(result.space.lower), np.asarray(result.space.upper)
     low, high = _limits(scaled, lower, upper)
     place = (scaled - low) / np.where(high > low, high - low, 1.0)
@@ -73,7 +71,7 @@ def plot_parallel(result: MultistartResult, *, ax: "Axes | None" = None) -> "Axe
     for p, a, b, below, above in zip(result.space.parameters, low, high, lower, upper, strict=True):
         ends = f"{float(p.from_scaled(a)):.4g} … {float(p.from_scaled(b)):.4g}"
         note = "" if np.isfinite(below) and np.isfinite(above) else ", as found"
-        names.append(f"{label_of(p)}\n{ends}{note}{', log' if p.scale == 'log' else ''}")
+        names.append(f"{p.label}\n{ends}{note}{', log' if p.scale == 'log' else ''}")
     ax.set_yticks(rows, names)
     ax.set_ylim(count - 0.6, -0.4)
     ax.set_xlim(0, 1)

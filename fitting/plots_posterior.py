@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import stats
 
-from fitting.plots_axes import add_shared_legend, grid_or_new, is_wide, label_of, scale_axis
+from fitting.plots_axes import add_shared_legend, grid_or_new, is_wide, scale_axis
 from fitting.posterior_result import Posterior
 from fitting.profile import ProfileResult
 from fitting.result import FitResult
@@ -64,7 +64,7 @@ def plot_posterior(
         ax.set_xlim(edges[0], edges[-1])
         ax.set_ylim(bottom=0)
         ax.set_yticks([])
-        ax.set_xlabel(label_of(parameter))
+        ax.set_xlabel(parameter.label)
     grid[0].set_ylabel("density")
     if axes is None:
         add_shared_legend(grid, 5)
@@ -160,9 +160,6 @@ def _edges(ax: "Axes | None", parameter: Parameter, values: np.ndarray) -> np.nd
 
 
 def _broken(parameter: Parameter) -> str:
-    """Name and unit, broken before its last part if long."""
-    name = parameter.path
-    if len(name) > 16 and "." in name:
-        head, tail = name.rsplit(".", 1)
-        name = f"{head}.\n{tail}"
-    return f"{name} [{parameter.unit}]" if parameter.unit else name
+    """Its label, broken before the last part of the path if long."""
+    label, last = parameter.label, parameter.path.rfind(".") + 1
+    return f"{label[:last]}\n{label[last:]}" if last and len(parameter.path) > 16 else label

@@ -107,7 +107,7 @@ def _draw(ax: "Axes", found: Profile, critical: float, fit: FitResult | None, sq
     ax.set_ylim(-0.05 * top if squared else -top, top)
     ax.margins(x=0.06)
     scale_axis(ax, parameter, found.values)
-    ax.set_xlabel(f"{found.path} [{found.unit}]" if found.unit else found.path)
+    ax.set_xlabel(parameter.label)
 
 
 def _draw_line(ax: "Axes", parameter: Parameter, fit: FitResult, reach: np.ndarray, squared: bool) -> None:

@@ -121,13 +121,13 @@ def _log_densities(target: Target, places: Float[Array, "places n"]) -> Float[Ar
 def _given(target: Target, starts: ArrayLike, chains: int) -> Float[Array, "chains n"]:
     """Starts in SI to whitened coordinates, a little off the bounds."""
     space = target.objective.space
-    values = jnp.asarray(starts, dtype=jnp.float64)
+    values = np.asarray(starts, dtype=float)
     if values.shape != (chains, len(space)):
         raise InputError(
             f"starts has shape {values.shape}; give one row for each of the {chains} chains and {len(space)} columns "
             f"({', '.join(space.paths)})."
         )
-    places = _placed(target, values)
+    places = _placed(target, jnp.asarray(space.scaled_rows(values)))
     bad = ~np.isfinite(np.asarray(_log_densities(target, places)))
     if bad.any():
         raise InputError(
@@ -138,11 +138,12 @@ def _given(target: Target, starts: ArrayLike, chains: int) -> Float[Array, "chai
 
 
 @eqx.filter_jit
-def _placed(target: Target, values: Float[Array, "chains n"]) -> Float[Array, "chains n"]:
+def _placed(target: Target, vectors: Float[Array, "chains n"]) -> Float[Array, "chains n"]:
+    """Scaled vectors to whitened coordinates."""
     box = target.box
     off = jnp.minimum(1e-6 * box.width, 0.25 * (box.upper - box.lower))
-    vectors = jnp.clip(jax.vmap(target.objective.space.scaled)(values), box.lower + off, box.upper - off)
-    return jax.vmap(lambda x: target.whitened(x))(vectors)
+    inside = jnp.clip(vectors, box.lower + off, box.upper - off)
+    return jax.vmap(lambda x: target.whitened(x))(inside)
 
 
 def _model_and_space(model: Any, space: ParameterSpace | None) -> tuple[Any, ParameterSpace]:

@@ -1,20 +1,25 @@
 """What sampling a posterior returns."""
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fitting.npz_file import NpzFile
 from twin._checks import InputError
-from twin.parameters import Parameter, ParameterSpace
+from twin.parameters import ParameterSpace
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_ARRAYS = ("values", "r_hat", "effective_size", "acceptance")
-_FORMAT = 1
+_FILE = NpzFile(
+    kind="posterior",
+    writer="Posterior.save",
+    version=1,
+    arrays=("values", "r_hat", "effective_size", "acceptance"),
+    plain=("divergences", "evaluations", "data", "variance"),
+)
 _R_HAT, _EFFECTIVE = 1.01, 400.0
 
 
@@ -60,13 +65,13 @@ class Posterior:
         apart, few = ~(self.r_hat <= _R_HAT), ~(self.effective_size >= _EFFECTIVE)
         if apart.any():
             parts.append(
-                f"The chains disagree (R̂ above {_R_HAT}) on {self._named(apart)}. Run more warm-up and samples; if it "
-                "stays, there are several modes, or parameters that the data cannot tell apart: look at plot_pairs."
+                f"The chains disagree (R̂ above {_R_HAT}) on {self.space.named(apart)}. Run more warm-up and samples; "
+                "if it stays, there are several modes, or parameters that the data cannot tell apart: see plot_pairs."
             )
         if few.any():
             parts.append(
-                f"Fewer than {_EFFECTIVE:g} effective draws of {self._named(few)}: quantiles are uncertain. Draw more "
-                "samples."
+                f"Fewer than {_EFFECTIVE:g} effective draws of {self.space.named(few)}: quantiles are uncertain. Draw "
+                "more samples."
             )
         if self.divergences:
             total = self.values.shape[0] * self.values.shape[1]
@@ -133,10 +138,7 @@ class Posterior:
         Args:
             path: file to write; the ending .npz is added if missing.
         """
-        parameters = [{f.name: getattr(p, f.name) for f in dataclasses.fields(p)} for p in self.space.parameters]
-        head = {"format": _FORMAT, "parameters": parameters, "divergences": self.divergences}
-        head |= {"evaluations": self.evaluations, "data": self.data, "variance": self.variance}
-        np.savez_compressed(path, head=np.asarray(json.dumps(head)), **{name: getattr(self, name) for name in _ARRAYS})
+        _FILE.write(path, self)
 
     @classmethod
     def load(cls, path: str | Path) -> "Posterior":
@@ -148,21 +150,7 @@ class Posterior:
         Raises:
             InputError: file missing, damaged, not a saved posterior, or of another version.
         """
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                head = json.loads(str(file["head"]))
-                arrays = {name: file[name] for name in _ARRAYS}
-        except Exception as error:
-            raise InputError(
-                f"{path} is not a readable posterior ({error}). Save it again by Posterior.save."
-            ) from error
-        if head.pop("format") != _FORMAT:
-            raise InputError(f"{path} was written by another version of drivetwin. Sample again, or use that version.")
-        parameters = []
-        for entry in head.pop("parameters"):
-            prior = entry.pop("prior")
-            parameters.append(Parameter(**entry, prior=None if prior is None else tuple(prior)))
-        return cls(space=ParameterSpace(parameters), **arrays, **head)
+        return cls(**_FILE.read(path))
 
     def _repr_html_(self) -> str:
         table = self.to_dataframe().to_html(float_format=lambda x: f"{x:.6g}")
@@ -178,6 +166,3 @@ class Posterior:
             f"{state}, {chains} chains of {samples} samples, {self.variance} variance, {self.divergences} divergences, "
             f"mean acceptance {np.mean(self.acceptance):.2f}"
         )
-
-    def _named(self, mask: np.ndarray) -> str:
-        return ", ".join(path for path, named in zip(self.space.paths, mask, strict=True) if named)

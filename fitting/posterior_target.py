@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from fitting.objective import Objective
 from fitting.solve import linearised
 from twin._checks import InputError
+from twin.parameters import ParameterSpace
 
 
 class Box(eqx.Module):
@@ -133,7 +134,7 @@ def whitened_target(objective: Objective, variance: str) -> Target:
     """
     space = objective.space
     x = np.asarray(space.pack(objective.model))
-    jacobian, (rows, _) = _linearised(objective, jnp.asarray(x))
+    jacobian, (rows, _) = linearised(objective, jnp.asarray(x))
     if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(jacobian))):
         raise InputError(
             "The residual or its derivative is not finite at the model given. Give a fitted model, or one that can be "
@@ -152,20 +153,15 @@ def whitened_target(objective: Objective, variance: str) -> Target:
     lower, upper = np.asarray(space.lower), np.asarray(space.upper)
     # Between two bounds the values spread by the range over √12, if the data say nothing.
     bounds = np.diag(np.sqrt(12) / (upper - lower))
-    width = np.linalg.norm(_root(np.vstack([information, bounds]), space.paths), axis=1)
+    width = np.linalg.norm(_root(np.vstack([information, bounds]), space), axis=1)
     box = Box(space.lower, space.upper, jnp.asarray(width))
     margin = np.minimum(width * np.log(2), 0.25 * (upper - lower))
     centre = box.outside(jnp.asarray(np.clip(x, lower + margin, upper - margin)))
     rows_of_u = np.vstack([information * np.exp(np.asarray(box.log_slope(centre))), 0.5 * bounds])
-    return Target(objective, box, centre, jnp.asarray(_root(rows_of_u, space.paths)), variance)
+    return Target(objective, box, centre, jnp.asarray(_root(rows_of_u, space)), variance)
 
 
-@eqx.filter_jit
-def _linearised(objective: Objective, vector: Array) -> tuple[Array, tuple[Array, Array | None]]:
-    return linearised(objective, vector)
-
-
-def _root(rows: np.ndarray, paths: tuple[str, ...]) -> np.ndarray:
+def _root(rows: np.ndarray, space: ParameterSpace) -> np.ndarray:
     """Root of the inverse of rowsᵀ·rows."""
     norms = np.linalg.norm(rows, axis=0)
     scaled = rows / np.where(norms > 0, norms, 1.0)
@@ -173,9 +169,8 @@ def _root(rows: np.ndarray, paths: tuple[str, ...]) -> np.ndarray:
     unseen = values <= max(rows.shape) * np.finfo(float).eps * values[0]
     if unseen.any():
         taking = np.linalg.norm(rotations[unseen], axis=0) > 1e-6
-        names = ", ".join(path for path, named in zip(paths, taking, strict=True) if named)
         raise InputError(
-            f"Neither data nor priors limit {names}: there is no posterior. Give them a prior or two finite "
-            "bounds, or leave them out of the space."
+            f"Neither data nor priors limit {space.named(taking)}: there is no posterior. Give them a prior or two "
+            "finite bounds, or leave them out of the space."
         )
     return rotations.T / values / norms[:, None]

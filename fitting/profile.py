@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array
 from scipy import stats
 
-from fitting.constraints import AbstractConstraint
+from fitting.constraints import AbstractConstraint, all_constraints
 from fitting.fit import chosen_solver
 from fitting.objective import Objective
 from fitting.profile_search import ProfileSearch
@@ -145,7 +145,7 @@ def profile(
         raise InputError(f'variance must be "estimated" or "known", but is {variance!r}.')
     if variance == "estimated" and result.degrees_of_freedom < 1:
         raise InputError('No data are left over to estimate a variance from. Use variance="known", or add data.')
-    constraints = tuple(constraints)
+    constraints = all_constraints(constraints)
     objective = Objective(residual, result.model, space, constraints)
     search = ProfileSearch(
         objective=objective,
@@ -194,7 +194,7 @@ def _squares(objective: Objective, result: FitResult, variance: str) -> np.ndarr
         return np.full(len(result.scaled), plain)
     if variance == "known" or objective.constraints:
         raise InputError('Robust losses are profiled with variance="estimated" and without constraints only.')
-    jacobian = np.asarray(_jacobian(objective, jnp.asarray(result.scaled)))
+    jacobian = np.asarray(linearised(objective, jnp.asarray(result.scaled))[0])
     weights = np.concatenate([np.asarray(curvature), np.ones(len(jacobian) - len(curvature))])  # priors at the end
     bent = np.diag(np.linalg.pinv(jacobian.T @ (jacobian * weights[:, None])))
     squares = np.diag(result.scaled_covariance) / bent
@@ -204,11 +204,6 @@ def _squares(objective: Objective, result: FitResult, variance: str) -> np.ndarr
 @eqx.filter_jit
 def _values(objective: Objective, vector: Array) -> tuple[Array, Array | None]:
     return objective(vector)
-
-
-@eqx.filter_jit
-def _jacobian(objective: Objective, vector: Array) -> Array:
-    return linearised(objective, vector)[0]
 
 
 def _critical(level: float, freedom: int | None) -> float:

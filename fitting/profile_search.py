@@ -1,6 +1,7 @@
 """The search for the ends of profile intervals: all parameters and both sides move on as one batch."""
 
 import itertools
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -17,8 +18,7 @@ class Side:
         self.index, self.sign, self.room = index, sign, room
         self.shifts, self.ratios, self.vectors = [0.0], [0.0], []
         self.next = min(scale, room)
-        self.open = room <= 0
-        self.done = self.open
+        self.done = room <= 0
         self.bracket = np.inf
         self.failures = 0
 
@@ -58,15 +58,15 @@ class Side:
             self.next = 0.5 * (a + b) if b - a > 0.5 * self.bracket else end
             self.bracket = b - a
         elif last >= self.room:
-            self.open = self.done = True
+            self.done = True
         elif last > 0 and self.next > last:
             # The fit there failed: less far out.
             self.next = 0.5 * (last + self.next)
-            self.done = self.open = self.next - last <= 1e-6 * last
+            self.done = self.next - last <= 1e-6 * last
         else:
             growth = np.clip(1.05 * critical / max(ratio, 1e-3 * critical), 1.2, 3.0)
             self.next = min(max(last, 1e-12) * growth if last > 0 else self.next / 3, self.room)
-            self.done = self.open = self.next <= 1e-14 * max(1.0, self.room if np.isfinite(self.room) else 1.0)
+            self.done = self.next <= 1e-14 * max(1.0, self.room if np.isfinite(self.room) else 1.0)
 
 
 class ProfileSearch:
@@ -109,14 +109,13 @@ class ProfileSearch:
 
     def unsettled(self) -> list[str]:
         """Parameters of which an end is only known roughly."""
-        paths = self.result.space.paths
-        return list(dict.fromkeys(paths[side.index] for side in self.sides if not side.done))
+        return self._paths_of(side for side in self.sides if not side.done)
 
     def failing(self) -> list[str]:
         """Parameters of which an end was not reached because fits with them held did not converge."""
-        paths = self.result.space.paths
-        lost = [s for s in self.sides if s.failures and s.end(self.critical) is None and s.shifts[-1] < s.room]
-        return list(dict.fromkeys(paths[side.index] for side in lost))
+        return self._paths_of(
+            s for s in self.sides if s.failures and s.end(self.critical) is None and s.shifts[-1] < s.room
+        )
 
     def fill(self, points: int) -> None:
         """Points in between, for the picture."""
@@ -162,6 +161,9 @@ class ProfileSearch:
         """The two sides of one parameter."""
         below, above = (side for side in self.sides if side.index == index)
         return below, above
+
+    def _paths_of(self, sides: Iterable[Side]) -> list[str]:
+        return list(dict.fromkeys(self.result.space.paths[side.index] for side in sides))
 
     def _guess(self, side: Side, shift: float) -> np.ndarray:
         """Where the other parameters will be: on the line through the two nearest points, else by linear theory."""

@@ -1,7 +1,6 @@
 """What a fit returns."""
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -9,15 +8,21 @@ import jax.numpy as jnp
 import numpy as np
 from scipy import stats
 
+from fitting.npz_file import NpzFile
 from fitting.solvers.stop import CONVERGED, Stop
 from twin._checks import InputError
-from twin.parameters import Parameter, ParameterSpace
+from twin.parameters import ParameterSpace
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_ARRAYS = ("values", "scaled", "scaled_covariance", "factor", "unseen", "active", "residual", "cost_history")
-_FORMAT = 2
+_FILE = NpzFile(
+    kind="fit result",
+    writer="FitResult.save",
+    version=2,
+    arrays=("values", "scaled", "scaled_covariance", "factor", "unseen", "active", "residual", "cost_history"),
+    plain=("condition_number", "degrees_of_freedom", "steps", "stop", "offset", "variance", "warning"),
+)
 
 
 class Estimate(NamedTuple):
@@ -57,7 +62,7 @@ class FitResult:
     active: np.ndarray
     """Which parameters sit on a bound that holds them back (parameters,)."""
     residual: np.ndarray
-    """Weighted residual at the end (residuals,)."""
+    """Weighted residual at the end (residuals,); NaN where it is not finite at the start."""
     cost_history: np.ndarray
     """Half the sum of squared residuals, before and after each step."""
     steps: int
@@ -80,15 +85,17 @@ class FitResult:
     def message(self) -> str:
         """What happened, and what to do about it."""
         parts = [str(Stop[getattr(Stop, self.stop)])]
+        if not self.success and np.isfinite(np.diag(self.scaled_covariance)).any():
+            parts.append("Standard errors and intervals hold only at a converged fit.")
         if self.active.any():
             parts.append(
-                f"On a bound: {self._named(self.active)}; their standard errors are not given. "
+                f"On a bound: {self.space.named(self.active)}; their standard errors are not given. "
                 "Widen the bounds if they are not physical."
             )
         if self.unseen.any():
             parts.append(
-                f"Not determined by these data: {self._named(self.unseen)}. Hold some fixed, give priors, or measure "
-                "something that sees them."
+                f"Not determined by these data: {self.space.named(self.unseen)}. Hold some fixed, give priors, or "
+                "measure something that sees them."
             )
         elif self.success and np.isnan(np.diag(self.scaled_covariance))[~self.active].any():
             parts.append(
@@ -104,13 +111,19 @@ class FitResult:
 
     @property
     def cost(self) -> float:
-        """Half the sum of squared residuals."""
+        """Half the sum of squared residuals; NaN where they are not finite at the start."""
         return 0.5 * float(self.residual @ self.residual)
 
     @property
     def rms(self) -> float:
         """Root mean square of the weighted residual; near 1 where the model fits and the weights are right [-]."""
         return float(np.sqrt(2 * self.cost / max(self.degrees_of_freedom, 1)))
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the weighted residual that uncertainties go by: 1 where the weights are exact, else its
+        rms [-]."""
+        return 1.0 if self.variance == "known" else self.rms
 
     @property
     def covariance(self) -> np.ndarray:
@@ -135,8 +148,7 @@ class FitResult:
         """Confidence intervals in SI (parameters, 2), by Student's t on the scale of each parameter.
 
         On a log scale the interval is therefore unsymmetric and stays positive; on a linear one it may reach beyond the
-        bounds. NaN where a parameter sits on a bound
-        or is not seen.
+        bounds. NaN where a parameter sits on a bound or is not seen.
 
         Args:
             level: confidence, between 0 and 1.
@@ -192,19 +204,7 @@ class FitResult:
         Args:
             path: file to write; the ending .npz is added if missing.
         """
-        parameters = [{f.name: getattr(p, f.name) for f in dataclasses.fields(p)} for p in self.space.parameters]
-        head = {
-            "format": _FORMAT,
-            "parameters": parameters,
-            "condition_number": self.condition_number,
-            "degrees_of_freedom": self.degrees_of_freedom,
-            "steps": self.steps,
-            "stop": self.stop,
-            "offset": self.offset,
-            "variance": self.variance,
-            "warning": self.warning,
-        }
-        np.savez(path, head=np.asarray(json.dumps(head)), **{name: getattr(self, name) for name in _ARRAYS})
+        _FILE.write(path, self)
 
     @classmethod
     def load(cls, path: str | Path, model: Any) -> "FitResult":
@@ -220,45 +220,24 @@ class FitResult:
         Raises:
             InputError: file missing, damaged or not a saved result; model without the parameters.
         """
-        path = Path(path)
-        if not path.exists() and path.with_name(f"{path.name}.npz").exists():
-            path = path.with_name(f"{path.name}.npz")  # the ending that `save` added
-        if not path.exists():
-            raise InputError(f"{path} does not exist. Give the file that FitResult.save wrote.")
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                head = json.loads(str(file["head"]))
-                arrays = {name: file[name] for name in _ARRAYS}
-        except Exception as error:
-            raise InputError(
-                f"{path} is not a readable fit result ({error}). Save it again by FitResult.save."
-            ) from error
-        if head.pop("format") != _FORMAT:
-            raise InputError(f"{path} was written by another version of drivetwin. Fit again, or use that version.")
-        parameters = []
-        for entry in head.pop("parameters"):
-            prior = entry.pop("prior")
-            parameters.append(Parameter(**entry, prior=None if prior is None else tuple(prior)))
-        space = ParameterSpace(parameters)
-        fitted = space.with_values(model, jnp.asarray(arrays["values"]))
-        return cls(model=fitted, space=space, **arrays, **head)
+        saved = _FILE.read(path)
+        return cls(model=saved["space"].with_values(model, jnp.asarray(saved["values"])), **saved)
 
     def _repr_html_(self) -> str:
-        state = "converged" if self.success else "NOT converged"
         table = self.to_dataframe().to_html(float_format=lambda x: f"{x:.6g}")
-        facts = (
-            f"{state} in {self.steps} steps, weighted residual {self.rms:.4g} rms, "
-            f"{self.degrees_of_freedom} degrees of freedom, "
-            f"condition number {self.condition_number:.3g}"
-        )
-        return f"<div><p><b>Fit</b>: {facts}.</p><p>{self.message}</p>{table}</div>"
+        return f"<div><p><b>Fit</b>: {self._facts()}.</p><p>{self.message}</p>{table}</div>"
 
     def __repr__(self) -> str:
         table = self.to_dataframe().to_string(float_format=lambda x: f"{x:.6g}")
-        return f"{table}\nWeighted residual {self.rms:.4g} rms. {self.message}"
+        return f"{table}\nFit: {self._facts()}. {self.message}"
 
-    def _named(self, mask: np.ndarray) -> str:
-        return ", ".join(path for path, named in zip(self.space.paths, mask, strict=True) if named)
+    def _facts(self) -> str:
+        state = "converged" if self.success else "NOT converged"
+        rms = f"{self.rms:.4g} rms" if np.isfinite(self.rms) else "not evaluated"
+        return (
+            f"{state} in {self.steps} steps, weighted residual {rms}, {self.degrees_of_freedom} degrees of freedom, "
+            f"condition number {self.condition_number:.3g}"
+        )
 
     def _remark(self, i: int) -> str:
         if self.active[i]:

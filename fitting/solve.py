@@ -133,7 +133,7 @@ def outcome(vector: Array, state: BoundedState | SLSQPState, reason: Stop, objec
             history=state.history,
             reason=reason,
         )
-    jacobian, (values, curvature) = linearised(objective, vector)
+    jacobian, (values, curvature) = linearised_raw(objective, vector)
     equalities = objective.equality(vector).size
     holds = (jnp.arange(state.multipliers.size) < equalities) | (state.multipliers > 0)
     cost = jnp.maximum(state.here.value, jnp.finfo(vector.dtype).tiny)
@@ -151,6 +151,7 @@ def outcome(vector: Array, state: BoundedState | SLSQPState, reason: Stop, objec
     )
 
 
+@eqx.filter_jit
 def linearised(objective: Objective, vector: Array) -> tuple[Array, tuple[Array, Array | None]]:
     """Jacobian of the residual, with the residual and the curvature of its losses.
 
@@ -158,6 +159,11 @@ def linearised(objective: Objective, vector: Array) -> tuple[Array, tuple[Array,
         objective: of the fit.
         vector: scaled vector.
     """
+    return linearised_raw(objective, vector)
+
+
+def linearised_raw(objective: Objective, vector: Array) -> tuple[Array, tuple[Array, Array | None]]:
+    """`linearised` without its own compilation, for use inside other compiled functions."""
 
     def function(x: Array) -> tuple[Array, tuple[Array, Array | None]]:
         values, curvature = objective(x)
@@ -168,7 +174,7 @@ def linearised(objective: Objective, vector: Array) -> tuple[Array, tuple[Array,
 
 def _gauss_newton_factor(objective: Objective, start: Array) -> Array:
     """Lower triangular factor of the Gauss-Newton Hessian at the start, a little of the identity added."""
-    jacobian, _ = linearised(objective, start)
+    jacobian, _ = linearised_raw(objective, start)
     size = jnp.sqrt(jnp.sum(jacobian**2, axis=0))
     largest = jnp.maximum(jnp.max(size), jnp.finfo(start.dtype).tiny)
     damping = 1e-4 * jnp.maximum(size, 1e-4 * largest)

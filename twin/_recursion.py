@@ -1,14 +1,13 @@
 """Recursions x[k+1] = f(θ, x[k], u[k]), and two ways to differentiate them.
 
 Alongside: JAX's own rule for a scan, which carries the tangents with the state. It is the fastest where the compiler
-turns the loop into one function (see `LOOP_OPTION`), and in batches.
+turns the loop into one function (see `twin._loop_option`), and in batches.
 
 Afterwards: without that option every operation of a loop is a call of its own, which costs more than the arithmetic of
 a feed drive. The states are then found first, and all steps are linearised together.
 """
 
 import contextlib
-import os
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from typing import Any
@@ -18,8 +17,7 @@ import jax.numpy as jnp
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float, PyTree
 
-LOOP_OPTION = "xla_cpu_small_while_loop_byte_threshold"
-"""Option of the CPU compiler: loops whose state is smaller than this many bytes become one function."""
+from twin._loop_option import small_loops_are_one_function
 
 _in_batch: ContextVar[bool] = ContextVar("in_batch", default=False)
 
@@ -45,16 +43,16 @@ def run_recursion(
     Returns:
         The states before each step, the state after the last one, and what else the steps returned, stacked.
     """
-    if _in_batch.get() or (LOOP_OPTION in os.environ.get("XLA_FLAGS", "") and jax.default_backend() == "cpu"):
+    if _in_batch.get() or (small_loops_are_one_function() and jax.default_backend() == "cpu"):
         # A state stays in its parts: in a batch every part is then one run of numbers, as vector units want it.
         return _plain(step, parameters, start, items)
-    ravel, unravel = _flattener(start)
+    flat_start, unravel = ravel_pytree(start)
 
     def flat_step(parameters: PyTree[Array], x: Array, item: PyTree[Array]) -> tuple[Array, PyTree[Array]]:
         after, extra = step(parameters, unravel(x), item)
-        return ravel(after), extra
+        return ravel_pytree(after)[0], extra
 
-    states, last, extras = _run_afterwards(flat_step, parameters, ravel(start), items)
+    states, last, extras = _run_afterwards(flat_step, parameters, flat_start, items)
     return jax.vmap(unravel)(states), unravel(last), extras
 
 
@@ -122,9 +120,3 @@ def _map_in_chunks(function: Callable, items: PyTree[Array]) -> PyTree[Array]:
     index = jnp.minimum(jnp.arange(filled), count - 1).reshape(-1, chunk)
     out = jax.lax.map(lambda rows: jax.vmap(function)(jax.tree.map(lambda x: x[rows], items)), index)
     return jax.tree.map(lambda x: x.reshape((filled, *x.shape[2:]))[:count], out)
-
-
-def _flattener(example: PyTree[Array]) -> tuple[Callable[[PyTree[Array]], Array], Callable[[Array], PyTree[Array]]]:
-    """Functions from a tree of arrays to a vector and back."""
-    _, unravel = ravel_pytree(example)
-    return lambda tree: ravel_pytree(tree)[0], unravel

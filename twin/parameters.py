@@ -65,20 +65,30 @@ class Parameter(eqx.Module):
         if self.prior is not None and not (np.all(np.isfinite(self.prior)) and self.prior[1] > 0):
             raise InputError(f"{self.path}: prior must be (mean, positive standard deviation), but is {self.prior}.")
 
+    @property
+    def label(self) -> str:
+        """Path and unit, for tables and axes."""
+        return f"{self.path} [{self.unit}]" if self.unit else self.path
+
     def to_scaled(self, value: ArrayLike) -> Float[Array, "..."]:
         """From the value in SI to the variable that a solver moves."""
-        value = jnp.asarray(value)
-        return jnp.log(value) if self.scale == "log" else value / self._size()
+        return self._scaled(jnp, jnp.asarray(value))
 
     def from_scaled(self, scaled: ArrayLike) -> Float[Array, "..."]:
         """From the variable that a solver moves to the value in SI."""
-        scaled = jnp.asarray(scaled)
-        return jnp.exp(scaled) if self.scale == "log" else scaled * self._size()
+        return self._unscaled(jnp, jnp.asarray(scaled))
 
     def slope(self, value: ArrayLike) -> Float[Array, "..."]:
         """Derivative of the value with respect to the scaled variable."""
         value = jnp.asarray(value)
         return value if self.scale == "log" else jnp.full_like(value, self._size())
+
+    # Written once for JAX and for NumPy.
+    def _scaled(self, numpy: Any, value: Any) -> Any:
+        return numpy.log(value) if self.scale == "log" else value / self._size()
+
+    def _unscaled(self, numpy: Any, scaled: Any) -> Any:
+        return numpy.exp(scaled) if self.scale == "log" else scaled * self._size()
 
     def _size(self) -> float:
         if self.size is not None:
@@ -131,6 +141,10 @@ class ParameterSpace(eqx.Module):
         """Units, in order."""
         return tuple(p.unit for p in self.parameters)
 
+    def named(self, mask: np.ndarray) -> str:
+        """Paths that a mask over the parameters picks, for a message."""
+        return ", ".join(path for path, named in zip(self.paths, mask, strict=True) if named)
+
     @property
     def lower(self) -> Float[Array, "parameters"]:
         """Lower bounds of the scaled vector."""
@@ -173,15 +187,13 @@ class ParameterSpace(eqx.Module):
 
     def scaled_rows(self, values: np.ndarray) -> np.ndarray:
         """`scaled` of many vectors (rows, parameters), outside of compiled code: any number, nothing to compile."""
-        logs = [p.scale == "log" for p in self.parameters]
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.where(logs, np.log(values), values / [p._size() for p in self.parameters])
+            return np.stack([p._scaled(np, v) for p, v in zip(self.parameters, values.T, strict=True)], axis=1)
 
     def unscaled_rows(self, vectors: np.ndarray) -> np.ndarray:
         """`unscaled` of many vectors (rows, parameters) outside of compiled code."""
-        logs = [p.scale == "log" for p in self.parameters]
         with np.errstate(over="ignore", invalid="ignore"):
-            return np.where(logs, np.exp(vectors), vectors * [p._size() for p in self.parameters])
+            return np.stack([p._unscaled(np, v) for p, v in zip(self.parameters, vectors.T, strict=True)], axis=1)
 
     def slopes(self, values: Float[Array, "parameters"]) -> Float[Array, "parameters"]:
         """Derivatives of the values with respect to the scaled vector."""

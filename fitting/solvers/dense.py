@@ -89,6 +89,19 @@ def least_squares_solve(matrix: Float[Array, "rows columns"], target: Float[Arra
     return jax.lax.fori_loop(0, columns, substitute, jnp.zeros(columns))
 
 
+def pushed_on_bounds(
+    gradient: Float[Array, "columns"], lower: Float[Array, "columns"], upper: Float[Array, "columns"]
+) -> Bool[Array, "columns"]:
+    """Which variables that start from zero are there on a bound that their gradient pushes them against.
+
+    Args:
+        gradient: of what is minimised, at zero.
+        lower: lower bounds, at most zero.
+        upper: upper bounds, at least zero.
+    """
+    return ((lower == 0) & (gradient > 0)) | ((upper == 0) & (gradient < 0))
+
+
 def bounded_least_squares(
     matrix: Float[Array, "rows columns"],
     target: Float[Array, "rows"],
@@ -155,14 +168,10 @@ def bounded_least_squares(
         _, _, _, settled, count = carry
         return ~settled & (count < 10 * columns)
 
-    if start is None:
-        x = jnp.zeros(columns)
-        at_lower = ((lower == 0) & (gradient_at_zero > 0)) | pinned
-        at_upper = (upper == 0) & (gradient_at_zero < 0) & ~pinned
-    else:
-        x, active = start
-        at_lower = (active & (x == lower)) | pinned
-        at_upper = active & (x == upper) & ~pinned
+    cold = (jnp.zeros(columns), pushed_on_bounds(gradient_at_zero, lower, upper))
+    x, active = cold if start is None else start
+    at_lower = (active & (x == lower)) | pinned
+    at_upper = active & (x == upper) & ~pinned
     carry = (x, at_lower, at_upper, jnp.asarray(False), jnp.asarray(0))
     x, at_lower, at_upper, _, _ = jax.lax.while_loop(unsettled, body, carry)
     return x, at_lower | at_upper

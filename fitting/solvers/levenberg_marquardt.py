@@ -56,12 +56,11 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
 
     Moré's trust-region form ("The Levenberg-Marquardt algorithm: implementation and theory", 1978): the step is the
     best of those that are no longer than a radius, and the radius follows how well the last step's reduction was
-    foreseen.
-    Each step solves the damped linear least-squares problem within the bounds themselves, by an active set (not a
-    change of variables, not a clipped step). No unit of a variable matters, as a step's length is weighted by the
-    Jacobian's column norms. As in Moré's, former norms count too, for they keep a variable from running away when
-    its column
-    vanishes; here the memory fades as the cost falls, so that a far start does not tie the variables down for good.
+    foreseen. Each step solves the damped linear least-squares problem within the bounds themselves, by an active set
+    (not a change of variables, not a clipped step). No unit of a variable matters, as a step's length is weighted by
+    the Jacobian's column norms. As in Moré's, former norms count too, for they keep a variable from running away when
+    its column vanishes; here the memory fades as the cost falls, so that a far start does not tie the variables down
+    for good.
 
     It has converged when the linear model promises nothing more (`rtol` on the relative offset), when the undamped step
     is negligible (`xtol`, or what rounding makes of the residual), or when no step helps where the gradient is zero.
@@ -141,7 +140,7 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         radius = jnp.where(
             first,
             self.initial_radius * jnp.sqrt(model.squares),
-            _radius(state, gain, reduction, _norm(state.scale * moved), _norm(scale * moved)),
+            _radius(state, gain, reduction, jnp.linalg.norm(state.scale * moved), jnp.linalg.norm(scale * moved)),
         )
         found = model.steps(weights, radius, state.damping)
         newton, z = found.newton, found.damped
@@ -260,7 +259,3 @@ def _radius(state: BoundedState, gain: Array, reduction: Array, length: Array, n
     shrunk = jnp.where(gain > 0, shrunk * now / jnp.where(length > 0, length, 1.0), shrunk)
     trusted = (gain >= 0.75) | (state.damping == 0)
     return jnp.where(gain <= 0.25, shrunk, jnp.where(trusted, 2 * now, kept))
-
-
-def _norm(vector: Array) -> Array:
-    return jnp.sqrt(jnp.sum(vector**2))

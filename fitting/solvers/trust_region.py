@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from fitting.solvers.dense import bounded_least_squares, orthogonal_triangle
+from fitting.solvers.dense import bounded_least_squares, orthogonal_triangle, pushed_on_bounds
 
 
 class LinearModel(eqx.Module):
@@ -55,8 +55,8 @@ class LinearModel(eqx.Module):
             guess: λ to try first; zero if there is none.
         """
         # A damped step is never longer than this over λ.
-        gradient = _length(self.matrix.T @ self.projected / weights)
-        ceiling = gradient / jnp.where(radius > 0, radius, 1.0)
+        gradient = self.matrix.T @ self.projected
+        ceiling = jnp.linalg.norm(gradient / weights) / jnp.where(radius > 0, radius, 1.0)
         first_guess = jnp.where((guess > 0) & (guess < ceiling), guess, 1e-3 * ceiling)
 
         def refine(carry: tuple[Steps, Array, Array, Array, Array, Array]) -> tuple:
@@ -73,7 +73,7 @@ class LinearModel(eqx.Module):
                 held=active,
                 damping=damping,
             )
-            length, full = _length(weights * z), _length(weights * steps.newton)
+            length, full = jnp.linalg.norm(weights * z), jnp.linalg.norm(weights * steps.newton)
             below = jnp.where(length > radius, damping, below)
             above = jnp.where(length < radius, damping, above)
             rise = _inverse(length) - _inverse(full)
@@ -89,8 +89,7 @@ class LinearModel(eqx.Module):
             return ~met & (count < 9)
 
         zero = jnp.zeros_like(ceiling)
-        still, gradient = jnp.zeros_like(weights), self.matrix.T @ self.projected
-        pushed = jnp.where(gradient > 0, self.lower == 0, (gradient < 0) & (self.upper == 0))
+        still, pushed = jnp.zeros_like(weights), pushed_on_bounds(gradient, self.lower, self.upper)
         nothing = Steps(newton=still, active=pushed, damped=still, held=pushed, damping=zero)
         start = (nothing, zero, zero, ceiling, jnp.asarray(False), jnp.asarray(0))
         return jax.lax.while_loop(unmet, refine, start)[0]
@@ -141,10 +140,6 @@ def linear_model(
         lower=lower * norms,
         upper=upper * norms,
     )
-
-
-def _length(vector: Array) -> Array:
-    return jnp.sqrt(jnp.sum(vector**2))
 
 
 def _inverse(value: Array) -> Array:

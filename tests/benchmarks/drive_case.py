@@ -1,7 +1,7 @@
 """An eight-parameter drive fit: a two-mass drive with friction on both sides in a continuous cascade, simulated."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -54,6 +54,17 @@ class Case(NamedTuple):
     """The residual of a scaled vector by NumPy and SciPy alone."""
 
 
+def space_around(truth: Mapping[str, tuple[float, str]], spread: float = SPREAD) -> ParameterSpace:
+    """Parameters on a log scale, free by a factor on both sides of the truth.
+
+    Args:
+        truth: value and unit by path.
+        spread: the factor.
+    """
+    free = [Parameter(path, unit, v / spread, v * spread, scale="log") for path, (v, unit) in truth.items()]
+    return ParameterSpace(free)
+
+
 def drive_case(samples: int = 300, *, seed: int = 1) -> Case:
     """Simulate the record.
 
@@ -76,15 +87,12 @@ def drive_case(samples: int = 300, *, seed: int = 1) -> Case:
         name: np.asarray(clean.channel(name)) + sd * noise.standard_normal(samples) for name, sd in DEVIATION.items()
     }
     record = Record.create(times, channels, dict.fromkeys(channels, "rad"), name="simulated drive")
-    space = ParameterSpace(
-        [Parameter(path, unit, v / SPREAD, v * SPREAD, scale="log") for path, (v, unit) in TRUTH.items()]
-    )
     wanted = _sampled_reference(move, times)
     measured = [np.asarray(channels[name]) for name in DEVIATION]
     return Case(
         TrajectoryResidual.create(record, move, DEVIATION, stepping=stepping),
         model,
-        space,
+        space_around(TRUTH),
         lambda vector: _scipy_residual(wanted, times, measured, vector),
     )
 

@@ -4,12 +4,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from fitting.residuals.frequency_response import FrequencyResponseResidual, rest_response
-from tests.benchmarks.drive_case import SPREAD, Case
+from tests.benchmarks.drive_case import Case, space_around
 from twin.control import DelayedPlant
 from twin.drives import TwoMass
 from twin.frf import FRF
 from twin.laws import ViscousFriction
-from twin.parameters import Parameter, ParameterSpace
 
 TRUTH = {
     "plant.motor_inertia": (0.01, "kg m^2"),
@@ -51,12 +50,8 @@ def frequency_case(lines: int = 100, *, seed: int = 1) -> Case:
         "ratio",
         jnp.asarray(deviation**2),
     )
-    space = ParameterSpace(
-        [Parameter(path, unit, v / SPREAD, v * SPREAD, scale="log") for path, (v, unit) in TRUTH.items()]
-    )
-    return Case(
-        FrequencyResponseResidual(measured, kind="log"), model, space, lambda vector: _scipy_residual(measured, vector)
-    )
+    residual = FrequencyResponseResidual(measured, kind="log")
+    return Case(residual, model, space_around(TRUTH), lambda vector: _scipy_residual(measured, vector))
 
 
 def _scipy_residual(measured: FRF, vector: np.ndarray) -> np.ndarray:

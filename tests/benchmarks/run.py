@@ -7,10 +7,11 @@ chooses.
 
 import argparse
 import json
-import os
 from pathlib import Path
 
 import jax
+
+from twin._loop_option import make_small_loops_one_function
 
 SECTIONS = ("simulation", "programmes", "multistart", "swarm")
 
@@ -27,7 +28,7 @@ def main() -> None:
     options = parser.parse_args()
 
     # As the command line does; before the first array is made.
-    os.environ.setdefault("XLA_FLAGS", "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1000000")
+    make_small_loops_one_function()
     jax.config.update("jax_enable_x64", True)
     # Imported late: these modules make arrays.
     from tests.benchmarks import multistart, programmes, swarm

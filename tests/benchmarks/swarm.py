@@ -5,55 +5,30 @@ published parameters as truth and noise of the published remaining error), and t
 `frequency_case`.
 """
 
+import contextlib
+import os
+import tempfile
 import time
-from typing import NamedTuple
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+from unittest import mock
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from fitting.multistart import multistart
 from fitting.objective import Objective
-from fitting.residuals.residual import AbstractResidual
+from fitting.residuals.load_surface import LoadSurfaceResidual, total_over_contacts
 from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt
 from fitting.solvers.slsqp import SLSQP
-from tests.benchmarks.drive_case import drive_case
+from tests.benchmarks.drive_case import drive_case, space_around
 from tests.benchmarks.frequency_case import frequency_case
-from twin._checks import as_array
-from twin.parameters import Parameter, ParameterSpace
+from twin.laws import AbstractLoadLaw, HyperbolicDamping, RootStiffness
 
 CLOSE = 1.001
 """Cost, relative to the best known, that counts as the same error."""
-
-
-class Surface(eqx.Module):
-    """Parameters of a stiffness or damping surface."""
-
-    p: jax.Array = eqx.field(converter=as_array)
-
-
-class SurfaceResidual(AbstractResidual):
-    """Leipe eq. 5: the sum over both drive trains against measured points, relative to their noise."""
-
-    law: object = eqx.field(static=True)
-    forces: jax.Array = eqx.field(converter=as_array)
-    measured: jax.Array = eqx.field(converter=as_array)
-    deviation: jax.Array = eqx.field(converter=as_array)
-
-    def __call__(self, model):
-        total = self.law(model.p, self.forces[0]) + self.law(model.p, self.forces[1])
-        return (total - self.measured) / self.deviation
-
-
-def stiffness(p, force):
-    """Leipe eq. 3."""
-    return p[0] * jnp.abs(force) ** (1 / p[1])
-
-
-def damping(p, force):
-    """Leipe eq. 8."""
-    return p[0] / (p[1] + jnp.abs(force)) + p[2]
 
 
 class Ledger(NamedTuple):
@@ -69,25 +44,25 @@ class Ledger(NamedTuple):
     """Whether the error was reached at all."""
 
 
-def _surface(law, truth, relative, units):
+def _surface(law: AbstractLoadLaw, units: dict[str, str], relative: float) -> tuple:
     rng = np.random.default_rng(2)
     mean = np.linspace(200.0, 3000.0, 30)
     forces = np.stack([mean * (1 + 0.1 * rng.standard_normal(30)), mean * (1 + 0.1 * rng.standard_normal(30))])
-    clean = np.asarray(law(jnp.asarray(truth), forces[0]) + law(jnp.asarray(truth), forces[1]))
+    clean = np.asarray(total_over_contacts(law, forces))
     deviation = relative * np.linalg.norm(clean) / np.sqrt(clean.size)
     measured = clean + deviation * rng.standard_normal(clean.size)
-    space = ParameterSpace(
-        [Parameter(f"p.{i}", u, v / 20, v * 20, scale="log") for i, (v, u) in enumerate(zip(truth, units, strict=True))]
-    )
-    return SurfaceResidual(law, forces, measured, np.asarray(deviation)), Surface(truth), space
+    truth = {path: (float(getattr(law, path)), unit) for path, unit in units.items()}
+    return LoadSurfaceResidual(forces, measured, deviation), law, space_around(truth, 20.0)
 
 
 def problems():
     """Name, residual, model and space of each problem."""
     drive, responses = drive_case(200), frequency_case()
+    stiffness = RootStiffness(1.8709e7, 5.6406)
+    damping = HyperbolicDamping(9.5376e5, 148.3813, 2.0734e4)
     return {
-        "Leipe stiffness (2)": _surface(stiffness, [1.8709e7, 5.6406], 0.0401, ("", "1")),
-        "Leipe damping (3)": _surface(damping, [9.5376e5, 148.3813, 2.0734e4], 0.0451, ("", "N", "N s/m")),
+        "Leipe stiffness (2)": _surface(stiffness, {"k1": "N/m", "k2": ""}, 0.0401),
+        "Leipe damping (3)": _surface(damping, {"d1": "N^2 s/m", "d2": "N", "d3": "N s/m"}, 0.0451),
         "drive record (8)": (drive.residual, drive.model, drive.space),
         "drive's frequency responses (8)": (responses.residual, responses.model, responses.space),
     }
@@ -123,9 +98,19 @@ class _Reached(Exception):
     """The swarm is as good as the target."""
 
 
-def _swarm(name, residual, model, space, target, particles, iterations, seed) -> Ledger:
-    import pyswarms
+@contextlib.contextmanager
+def _pyswarms() -> Iterator[Any]:
+    """The package, kept from writing `report.log` into the working directory: its logging is what LOG_CFG names."""
+    with tempfile.TemporaryDirectory() as folder:
+        nothing = Path(folder) / "logging.yml"
+        nothing.write_text("{version: 1, disable_existing_loggers: false}", encoding="utf-8")
+        with mock.patch.dict(os.environ, LOG_CFG=str(nothing)):
+            import pyswarms
 
+            yield pyswarms
+
+
+def _swarm(name, residual, model, space, target, particles, iterations, seed) -> Ledger:
     objective = Objective(residual, model, space)
     costs = jax.jit(lambda o, x: jax.vmap(lambda v: 0.5 * jnp.sum(o(v)[0] ** 2))(x))
     bounds = (np.asarray(space.lower), np.asarray(space.upper))
@@ -142,14 +127,16 @@ def _swarm(name, residual, model, space, target, particles, iterations, seed) ->
 
     np.random.seed(seed)  # noqa: NPY002 (pyswarms draws from NumPy's global generator)
     options = {"c1": 1.49445, "c2": 1.49445, "w": 0.729}  # Clerc and Kennedy's constriction
-    swarm = pyswarms.single.GlobalBestPSO(particles, len(space), options, bounds=bounds)
-    clock = time.perf_counter()
-    try:
-        swarm.optimize(evaluate, iterations, verbose=False)
-        reached = False
-    except _Reached:
-        reached = True
-    return Ledger(name, f"swarm of {particles}", paid, time.perf_counter() - clock, reached)
+    with _pyswarms() as pyswarms:
+        swarm = pyswarms.single.GlobalBestPSO(particles, len(space), options, bounds=bounds)
+        clock = time.perf_counter()
+        try:
+            swarm.optimize(evaluate, iterations, verbose=False)
+            reached = False
+        except _Reached:
+            reached = True
+        seconds = time.perf_counter() - clock
+    return Ledger(name, f"swarm of {particles}", paid, seconds, reached)
 
 
 def as_markdown(rows: list[Ledger]) -> str:

@@ -12,6 +12,30 @@ from twin._checks import as_array
 from twin.parameters import Parameter, ParameterSpace
 
 
+class Line(eqx.Module):
+    """a + b·x, and a number that nothing depends on."""
+
+    a: jax.Array = eqx.field(converter=as_array)
+    b: jax.Array = eqx.field(converter=as_array)
+    unused: jax.Array = eqx.field(converter=as_array)
+
+
+class LineResidual(AbstractResidual):
+    """(a + b·x - y) / σ."""
+
+    x: jax.Array = eqx.field(converter=as_array)
+    y: jax.Array = eqx.field(converter=as_array)
+    deviation: float = 1.0
+
+    def __call__(self, model):
+        return (model.a + model.b * self.x - self.y) / self.deviation
+
+
+LINE_X = np.linspace(0.0, 2.0, 40)
+LINE_Y = 3.0 - 0.7 * LINE_X + 0.1 * np.random.default_rng(5).standard_normal(40)
+"""A line with noise."""
+
+
 class Coefficients(eqx.Module):
     """A model that is nothing but its parameters."""
 

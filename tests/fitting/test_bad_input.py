@@ -1,5 +1,7 @@
 """Everything a user can get wrong about a fit has one clear error, or one clear status."""
 
+import inspect
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -7,6 +9,7 @@ import pytest
 
 from fitting.constraints import Equality, Inequality
 from fitting.fit import FitError, fit
+from fitting.multistart import multistart
 from fitting.residuals.residual import AbstractResidual
 from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt
 from fitting.solvers.slsqp import SLSQP
@@ -132,6 +135,13 @@ def positive_first(model):
 def test_constraints_of_the_wrong_kind(constraint, message):
     with pytest.raises(InputError, match=message):
         fit(evidence(), START, SPACE, constraints=[constraint])
+
+
+@pytest.mark.parametrize("procedure", [fit, multistart], ids=lambda p: p.__name__)
+def test_a_constraint_by_itself(procedure):
+    # Without the tests' check of types, as a user meets it.
+    with pytest.raises(InputError, match=r"a single Inequality\. Put it into a list: constraints=\[constraint\]"):
+        inspect.unwrap(procedure)(evidence(), START, SPACE, constraints=Inequality(positive_first))
 
 
 def test_constraint_for_a_solver_that_takes_none():

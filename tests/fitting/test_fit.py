@@ -1,42 +1,22 @@
 """Fits with known answers: estimates, errors and intervals against closed forms, bounds, priors, and bad input."""
 
-import equinox as eqx
-import jax.numpy as jnp
+import dataclasses
+
 import numpy as np
 import pytest
-from jaxtyping import Array, Float
 from scipy import stats
 
 from fitting.fit import FitError, fit
-from fitting.residuals.residual import AbstractResidual, JointResidual
+from fitting.residuals.residual import JointResidual
 from fitting.result import FitResult
+from tests.fitting.curves import LINE_X as X
+from tests.fitting.curves import LINE_Y as Y
+from tests.fitting.curves import Line, LineResidual
 from twin._checks import InputError
 from twin.parameters import Parameter, ParameterSpace
 
-
-class Line(eqx.Module):
-    """a + b·x, and a parameter that nothing depends on."""
-
-    a: Float[Array, ""]
-    b: Float[Array, ""]
-    unused: Float[Array, ""]
-
-
-class LineResidual(AbstractResidual):
-    """A line against samples of unit variance."""
-
-    x: Float[Array, " n"]
-    y: Float[Array, " n"]
-
-    def __call__(self, model):
-        return model.a + model.b * self.x - self.y
-
-
-RNG = np.random.default_rng(5)
-X = np.linspace(0.0, 2.0, 40)
-Y = 3.0 - 0.7 * X + 0.1 * RNG.standard_normal(40)
-RESIDUAL = LineResidual(jnp.asarray(X), jnp.asarray(Y))
-START = Line(jnp.asarray(1.0), jnp.asarray(1.0), jnp.asarray(4.0))
+RESIDUAL = LineResidual(X, Y)
+START = Line(1.0, 1.0, 4.0)
 SPACE = ParameterSpace([Parameter("a", "m"), Parameter("b", "m/s")])
 
 
@@ -70,7 +50,7 @@ def test_scales_change_nothing_but_the_way(result):
 
 def test_log_interval_stays_positive():
     space = ParameterSpace([Parameter("a", scale="log"), Parameter("b")])
-    noisy = LineResidual(jnp.asarray(X[:4]), jnp.asarray([0.1, 2.0, 0.2, 1.0]))
+    noisy = LineResidual(X[:4], [0.1, 2.0, 0.2, 1.0])
     assert fit(noisy, START, space).intervals()[0, 0] > 0
 
 
@@ -111,7 +91,7 @@ def test_held_parameters_stay_and_are_not_reported(result):
 
 
 def test_joint_residuals_add_up(result):
-    half = [LineResidual(jnp.asarray(X[s]), jnp.asarray(Y[s])) for s in (slice(0, 15), slice(15, 40))]
+    half = [LineResidual(X[s], Y[s]) for s in (slice(0, 15), slice(15, 40))]
     joint = fit(JointResidual(tuple(half)), START, SPACE)
     np.testing.assert_allclose(joint.values, result.values, rtol=1e-9)
 
@@ -133,6 +113,16 @@ def test_shows_itself(result):
     assert list(result.to_dataframe().index) == ["a", "b"]
 
 
+def test_intervals_of_a_fit_that_did_not_converge_are_marked(result):
+    remark = "Standard errors and intervals hold only at a converged fit."
+    assert remark not in repr(result)
+    for stop in ("too_many_steps", "infeasible", "stalled"):
+        stopped = dataclasses.replace(result, stop=stop)
+        for text in (repr(stopped), stopped._repr_html_()):
+            assert "NOT converged" in text
+            assert remark in text
+
+
 @pytest.mark.parametrize(
     ("space", "message"),
     [
@@ -142,16 +132,20 @@ def test_shows_itself(result):
     ],
 )
 def test_what_cannot_be_fitted_is_refused(space, message):
-    short = LineResidual(jnp.asarray(X[:2]), jnp.asarray(Y[:2]))
+    short = LineResidual(X[:2], Y[:2])
     with pytest.raises(InputError, match=message):
         fit(short, START, ParameterSpace(space))
 
 
 def test_residual_that_is_not_finite_is_a_status():
-    bad = LineResidual(jnp.asarray(X), jnp.asarray(np.where(X > 1, np.nan, Y)))
+    bad = LineResidual(X, np.where(X > 1, np.nan, Y))
     result = fit(bad, START, SPACE)
     assert not result.success
     assert "not finite at the start" in result.message
+    assert np.isnan(result.cost) and np.isnan(result.rms)
+    for text in (repr(result), result._repr_html_()):
+        assert "NOT converged in 0 steps, weighted residual not evaluated" in text
+        assert "hold only" not in text
     with pytest.raises(FitError, match="not finite at the start"):
         fit(bad, START, SPACE, throw=True)
 

@@ -92,6 +92,11 @@ def test_too_few_steps_are_reported_and_the_lowest_end_kept():
     assert short.best.cost == pytest.approx(np.nanmin(short.costs))
 
 
+def test_the_number_of_starts_may_be_numpys():
+    few = multistart(evidence(), MODEL, SPACE, starts=np.int64(2), max_steps=200)
+    assert few.starts.shape == (2, 4)
+
+
 def total_is_three(model):
     return model.b[0] + model.b[2] - 3.0
 

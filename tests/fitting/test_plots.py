@@ -2,48 +2,27 @@
 
 import dataclasses
 
-import equinox as eqx
-import jax.numpy as jnp
 import matplotlib
 import matplotlib.pyplot
 import numpy as np
 import pytest
-from jaxtyping import Array, Float
 
 from fitting.fit import fit
 from fitting.plots import plot_comparison, plot_correlation, plot_intervals, plot_residual, save_figure
 from fitting.plots_axes import grid_or_new
 from fitting.plots_convergence import plot_convergence
 from fitting.plots_diagnostics import plot_autocorrelation, plot_diagnostics, plot_quantiles, plot_sequence
-from fitting.residuals.residual import AbstractResidual
+from tests.fitting.curves import LINE_X as X
+from tests.fitting.curves import LINE_Y as Y
+from tests.fitting.curves import Line, LineResidual
 from twin._checks import InputError
 from twin.parameters import Parameter, ParameterSpace
 
 matplotlib.use("Agg")
 
 
-class Line(eqx.Module):
-    """a + b·x, and a number that nothing depends on."""
-
-    a: Float[Array, ""]
-    b: Float[Array, ""]
-    unused: Float[Array, ""]
-
-
-class LineResidual(AbstractResidual):
-    """A line against samples."""
-
-    x: Float[Array, " n"]
-    y: Float[Array, " n"]
-
-    def __call__(self, model):
-        return (model.a + model.b * self.x - self.y) / 0.1
-
-
-X = np.linspace(0.0, 2.0, 40)
-Y = 3.0 - 0.7 * X + 0.1 * np.random.default_rng(5).standard_normal(40)
-RESIDUAL = LineResidual(jnp.asarray(X), jnp.asarray(Y))
-START = Line(jnp.asarray(1.0), jnp.asarray(1.0), jnp.asarray(4.0))
+RESIDUAL = LineResidual(X, Y, 0.1)
+START = Line(1.0, 1.0, 4.0)
 BOUNDED = ParameterSpace([Parameter("a", "m", 0.0, 2.0), Parameter("b", "m/s"), Parameter("unused", "kg")])
 
 
@@ -65,7 +44,7 @@ def bounded():
 
 @pytest.fixture(scope="module")
 def failed():
-    bad = LineResidual(jnp.asarray(X), jnp.asarray(np.where(X > 1, np.nan, Y)))
+    bad = LineResidual(X, np.where(X > 1, np.nan, Y), 0.1)
     return fit(bad, START, ParameterSpace([Parameter("a", "m"), Parameter("b", "m/s")]))
 
 

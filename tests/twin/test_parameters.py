@@ -25,8 +25,9 @@ SPACE = ParameterSpace(
         Parameter("position_force.coefficients.1", "N"),
     ]
 )
+# The compiler flushes subnormal numbers to zero, NumPy does not.
 _values = st.tuples(
-    st.floats(1e-6, 1e12), st.floats(0.0, 1e6), st.floats(-1e9, 1e9, allow_subnormal=False), st.floats(-1e3, 1e3)
+    *(st.floats(a, b, allow_subnormal=False) for a, b in ((1e-6, 1e12), (0.0, 1e6), (-1e9, 1e9), (-1e3, 1e3)))
 )
 
 

@@ -18,7 +18,7 @@ from twin.drives import RackPinionDrive, leipe_drive
 from twin.drives.leipe import RATED_TORQUE, TORQUE_LIMIT
 from twin.laws import HarmonicForce, StribeckFriction
 from twin.record import Record
-from twin.references import AbstractReference
+from twin.references import AbstractReference, ConstantVelocity, SineSweep, SumReference
 from twin.simulation import simulate
 from twin.stepping import ConstantSteps
 
@@ -146,3 +146,18 @@ def measure(
 def _run(loop: SampledLoop, reference: AbstractReference, times: Array):
     trajectory = simulate(loop, reference, times, stepping=STEPPING)
     return jax.tree.map(jnp.asarray, trajectory.outputs)
+
+
+def sweep_reference(duration: float, start: float = 1.0) -> SumReference:
+    """0.1 to 400 Hz with 1 mm/s on 5 mm/s (section V).
+
+    Args:
+        duration: of the sweep [s].
+        start: time at which it begins, when the preload has settled [s].
+
+    Raises:
+        InputError: a duration that is not positive.
+    """
+    sweep = SineSweep(0.1, 400.0, duration, 0.001, start_time=start)
+    sweep.check_sampled(1 / PERIOD)
+    return SumReference((ConstantVelocity(0.005, 0.2), sweep))

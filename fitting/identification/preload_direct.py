@@ -1,0 +1,192 @@
+"""Load-dependent stiffness and damping at once: from all frequency responses, from motions, and from both."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from fitting.fit import fit
+from fitting.identification.preload_sweep import PreloadSweep
+from fitting.residuals.driven_table import DrivenTableResidual
+from fitting.residuals.preloaded_response import PreloadedResponseResidual
+from fitting.residuals.residual import JointResidual
+from fitting.residuals.weighted import Weighted
+from fitting.result import FitResult
+from twin._checks import InputError
+from twin.drives import DrivenTable, RackPinionDrive
+from twin.frf import FRF
+from twin.laws import AbstractLoadLaw
+from twin.parameters import Parameter, ParameterSpace
+from twin.record import Record
+
+_FIRST, _SECOND = "drive.train_1.mesh.", "drive.train_2.mesh."
+
+
+def mesh_space() -> ParameterSpace:
+    """k1, k2 and d1, d2, d3 of a `DrivenTable`, the same in both drive trains."""
+    names = (
+        ("stiffness.k1", "N/m"),
+        ("stiffness.k2", "1"),
+        ("damping.d1", "N^2 s/m"),
+        ("damping.d2", "N"),
+        ("damping.d3", "N s/m"),
+    )
+    return ParameterSpace(
+        Parameter(_FIRST + name, unit, lower=0.0, scale="log", tied=(_SECOND + name,)) for name, unit in names
+    )
+
+
+def motion_space(*, play: bool) -> ParameterSpace:
+    """What motions see besides: zeros of the encoders, friction of the guides, and where flanks change also the play.
+
+    Args:
+        play: whether the play is free; without a change of flanks it only shifts the zeros.
+    """
+    more = [
+        Parameter("zero_1", "m", size=1e-5),
+        Parameter("zero_2", "m", size=1e-5),
+        Parameter("drive.table_friction.coulomb", "N", lower=0.0, size=100.0),
+        Parameter("drive.table_friction.viscous", "N s/m", lower=0.0, size=100.0),
+    ]
+    if play:
+        path = "backlash.play"
+        more.append(Parameter(_FIRST + path, "m", lower=0.0, size=1e-5, tied=(_SECOND + path,)))
+    return ParameterSpace([*mesh_space().parameters, *more])
+
+
+def with_laws(drive: RackPinionDrive, stiffness: AbstractLoadLaw, damping: AbstractLoadLaw) -> RackPinionDrive:
+    """The drive with other laws in both meshes.
+
+    Args:
+        drive: the drive.
+        stiffness: k(F) of each drive train.
+        damping: d(F) of each drive train.
+    """
+
+    def laws(d: RackPinionDrive) -> tuple:
+        return (d.train_1.mesh.stiffness, d.train_2.mesh.stiffness, d.train_1.mesh.damping, d.train_2.mesh.damping)
+
+    return eqx.tree_at(laws, drive, (stiffness, stiffness, damping, damping))
+
+
+def with_zeros(table: DrivenTable, sweep: PreloadSweep) -> DrivenTable:
+    """The table with its encoders' zeros guessed from the mean positions and torques of one sweep.
+
+    Args:
+        table: the driven table.
+        sweep: a record at a preload that keeps both flanks in contact.
+    """
+    first = int(np.searchsorted(np.asarray(sweep.record.times), sweep.start))
+    forces = table.drive.motor_force(sweep.motor_torques())
+    zeros = []
+    for i, train in enumerate((table.drive.train_1, table.drive.train_2)):
+        apart = sweep.record.channel(f"position_{i + 1}") - sweep.record.channel("table_position")
+        zeros.append(jnp.mean(apart[first:]) - train.mesh.deflection(forces[i]))
+    return dataclasses.replace(table, zero_1=zeros[0], zero_2=zeros[1])
+
+
+def response_evidence(
+    sweeps: Sequence[PreloadSweep], responses: Sequence[FRF], drive: RackPinionDrive
+) -> PreloadedResponseResidual:
+    """Evidence from the complex responses of all sweeps, about the motor forces that their mean torques make.
+
+    The friction of the motors adds to one force and takes from the other, and drops out of the totals.
+
+    Args:
+        sweeps: one record for each preload, excited on the same velocity.
+        responses: their responses V_T/V_1 at the same frequencies, with variance.
+        drive: the drive, of which gear ratio and pinion diameter are used.
+
+    Raises:
+        InputError: no sweep, responses without variance.
+    """
+    if not sweeps or len(sweeps) != len(responses):
+        raise InputError(f"{len(sweeps)} sweeps and {len(responses)} responses were given. Give one response for each.")
+    if any(response.variance is None for response in responses):
+        raise InputError("A response has no variance to weight by. Estimate it from more than one window.")
+    return PreloadedResponseResidual(
+        responses[0].frequency,
+        jnp.stack([response.values[0, 0] for response in responses]),
+        jnp.stack([jnp.asarray(response.variance)[0, 0] for response in responses]),
+        jnp.stack([drive.motor_force(sweep.motor_torques()) for sweep in sweeps]),
+        sweeps[0].velocity,
+    )
+
+
+def cut(record: Record, begin: float, end: float) -> Record:
+    """The samples of a record with begin <= t < end, on a time axis that starts at zero.
+
+    Args:
+        record: the record.
+        begin: first time [s].
+        end: time after the last one [s].
+
+    Raises:
+        InputError: if fewer than eight samples are left.
+    """
+    times = np.asarray(record.times)
+    period = float(record.sample_period)
+    first, last = np.searchsorted(times, [begin - 0.5 * period, end - 0.5 * period])
+    rows = slice(int(first), int(last))
+    channels = {name: np.asarray(samples)[rows] for name, samples in record.channels.items()}
+    grid = np.arange(len(times[rows])) * period
+    return Record.create(grid, channels, record.units, name=record.name)
+
+
+@dataclasses.dataclass(frozen=True)
+class DirectFits:
+    """The same laws from three kinds of evidence; the model of each is a `DrivenTable`."""
+
+    frf: FitResult
+    """From the frequency responses of all preloads."""
+    time: FitResult
+    """From motions."""
+    joint: FitResult
+    """From both, each weighted by the scatter that it showed alone; its intervals are those of the weights."""
+
+
+def fit_direct(
+    frf: PreloadedResponseResidual,
+    time: DrivenTableResidual,
+    start: DrivenTable,
+    space: ParameterSpace,
+) -> DirectFits:
+    """Fit the laws to responses, to motions, and to both.
+
+    Args:
+        frf: evidence from responses.
+        time: evidence from motions.
+        start: model to start from.
+        space: what is free where motions take part, as `motion_space`.
+
+    Raises:
+        InputError: as `fitting.fit.fit`.
+    """
+    responses = fit(frf, start, mesh_space())
+    motions = fit(time, start, space)
+    parts = (Weighted(frf, _rms(responses)), Weighted(time, _rms(motions)))
+    joint = fit(JointResidual(parts, ("responses", "motions")), motions.model, space, variance="known")
+    return DirectFits(responses, motions, joint)
+
+
+def curve_errors(
+    found: RackPinionDrive, truth: RackPinionDrive, forces: Float[np.ndarray, "points"]
+) -> tuple[Float[Array, "points"], Float[Array, "points"]]:
+    """Relative errors of k(F) and d(F) of the first drive train at some forces.
+
+    Args:
+        found: identified drive.
+        truth: drive to compare with.
+        forces: forces [N].
+    """
+    at = jnp.asarray(forces)
+    one, other = found.train_1.mesh, truth.train_1.mesh
+    return one.stiffness(at) / other.stiffness(at) - 1, one.damping(at) / other.damping(at) - 1
+
+
+def _rms(result: FitResult) -> float:
+    """Standard deviation that the residual shows, degrees of freedom counted."""
+    return float(np.sqrt(np.sum(result.residual**2) / result.degrees_of_freedom))

@@ -14,4 +14,6 @@ from twin.control.position_velocity import EncoderMemory as EncoderMemory
 from twin.control.position_velocity import SampledPositionVelocity as SampledPositionVelocity
 from twin.control.preload import CascadeGains as CascadeGains
 from twin.control.preload import PreloadCascade as PreloadCascade
+from twin.control.reconstruction import mesh_forces_of_motion as mesh_forces_of_motion
+from twin.control.reconstruction import reconstruct_table_position as reconstruct_table_position
 from twin.control.sampled_preload import SampledPreloadCascade as SampledPreloadCascade

@@ -1,5 +1,6 @@
 """Plants: one drive per file."""
 
+from twin.drives.against_stop import AgainstStop as AgainstStop
 from twin.drives.driven_table import DrivenTable as DrivenTable
 from twin.drives.driven_table import DrivenTableInputs as DrivenTableInputs
 from twin.drives.driven_table import DrivenTableState as DrivenTableState

@@ -1,0 +1,127 @@
+"""How much preload a drive needs to be stiff under a process force, and what that costs."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import optimistix as optx
+from jaxtyping import Array, ArrayLike, Float
+
+from twin._checks import InputError, is_concrete, positive
+from twin.drives.rack_pinion import RackPinionDrive
+from twin.drives.rack_pinion_operation import mesh_forces, preloaded_torques
+
+_ACCURACY = 1e-10
+
+
+class PreloadChoice(NamedTuple):
+    """A preload, with what it gives and costs."""
+
+    preload: Float[Array, ""]
+    """Preload torque τ_p, half the difference of the motors' torques [Nm]."""
+    torques: Float[Array, "2"]
+    """Torques of the motors [Nm]."""
+    forces: Float[Array, "2"]
+    """Forces through the meshes [N]."""
+    stiffness: Float[Array, ""]
+    """Total stiffness k(F₁) + k(F₂) [N/m]."""
+    copper_loss: Float[Array, ""]
+    """Heat in both windings R·(τ₁² + τ₂²)/k_t² [W]."""
+    extra_loss: Float[Array, ""]
+    """Part of it that the same force without preload would not cost [W]."""
+
+
+def total_stiffness(
+    drive: RackPinionDrive,
+    preload: Float[ArrayLike, ""],
+    *,
+    load: Float[ArrayLike, ""] = 0.0,
+    velocity: Float[ArrayLike, ""] = 0.0,
+) -> Float[Array, ""]:
+    """Total stiffness k(F₁) + k(F₂) of a drive that moves evenly (Leipe et al., eq. 4, over all four quadrants) [N/m].
+
+    Args:
+        drive: the drive.
+        preload: preload torque τ_p [Nm].
+        load: process force on the table [N].
+        velocity: velocity of the table [m/s].
+    """
+    forces = mesh_forces(drive, jnp.stack(preloaded_torques(drive, preload, velocity=velocity, load=load)), velocity)
+    return drive.train_1.mesh.stiffness(forces[0]) + drive.train_2.mesh.stiffness(forces[1])
+
+
+def preload_for_stiffness(
+    drive: RackPinionDrive,
+    stiffness: float,
+    *,
+    rated_torque: float,
+    torque_constant: float,
+    resistance: float,
+    load: Float[ArrayLike, ""] = 0.0,
+    velocity: Float[ArrayLike, ""] = 0.0,
+    reserve: float = 0.0,
+) -> PreloadChoice:
+    """The smallest preload that keeps a stiffness under a process force, with both motors against opposite flanks.
+
+    Along the surface of Leipe et al., fig. 5, in the quadrants where the forces have different signs; differentiable
+    with respect to the drive, the load and the velocity.
+
+    Args:
+        drive: the drive.
+        stiffness: total stiffness wanted [N/m].
+        rated_torque: torque that no motor may exceed for long [Nm].
+        torque_constant: torque per current k_t [Nm/A].
+        resistance: resistance of a winding R [Ohm].
+        load: process force on the table, positive in the direction of motion [N].
+        velocity: velocity of the table [m/s].
+        reserve: force that is to stay on the flank of the motor that carries less [N].
+
+    Raises:
+        InputError: a stiffness, torque, constant or resistance that is not positive; a stiffness that not even the
+            rated torque gives; a load that leaves no room for a preload.
+    """
+    for name, value, unit in (
+        ("stiffness", stiffness, "N/m"),
+        ("rated_torque", rated_torque, "Nm"),
+        ("torque_constant", torque_constant, "Nm/A"),
+        ("resistance", resistance, "Ohm"),
+    ):
+        positive(name, value, unit)
+    r = drive.travel_per_radian
+    bare = jnp.stack(preloaded_torques(drive, 0.0, velocity=velocity, load=load))
+    through = mesh_forces(drive, bare, velocity)
+    # Without preload both flanks carry the same; this much is needed to bring one of them to its reserve.
+    least = r * (jnp.max(jnp.abs(through)) + reserve)
+    most = rated_torque - jnp.max(jnp.abs(bare))
+    best = total_stiffness(drive, most, load=load, velocity=velocity)
+    if is_concrete(least) and is_concrete(most) and float(least) > float(most):
+        raise InputError(
+            f"The load leaves no room for a preload: {float(least):.3g} Nm are needed to keep both flanks, but only "
+            f"{float(most):.3g} Nm are left up to the rated torque. Reduce the load or take a larger motor."
+        )
+    if is_concrete(best) and float(best) < stiffness:
+        raise InputError(
+            f"stiffness of {stiffness:.4g} N/m cannot be reached: with the rated torque it is {float(best):.4g} N/m. "
+            "Ask for less."
+        )
+
+    def missing(preload: Array, given: tuple) -> Array:
+        drive, load, velocity = given
+        return total_stiffness(drive, preload, load=load, velocity=velocity) / stiffness - 1
+
+    given = (drive, jnp.asarray(load, dtype=jnp.float64), jnp.asarray(velocity, dtype=jnp.float64))
+    enough = total_stiffness(drive, least, load=load, velocity=velocity) >= stiffness
+    solver = optx.Bisection(rtol=_ACCURACY, atol=_ACCURACY, expand_if_necessary=True)
+    found = optx.root_find(
+        missing, solver, 0.5 * (least + most), given, options={"lower": least, "upper": most}, throw=False
+    ).value
+    preload = jnp.where(enough, least, found)
+    torques = bare + jnp.stack([preload, -preload])
+    loss = resistance / torque_constant**2
+    return PreloadChoice(
+        preload=preload,
+        torques=torques,
+        forces=mesh_forces(drive, torques, velocity),
+        stiffness=total_stiffness(drive, preload, load=load, velocity=velocity),
+        copper_loss=loss * jnp.sum(torques**2),
+        extra_loss=loss * jnp.sum(torques**2 - bare**2),
+    )

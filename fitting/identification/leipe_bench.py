@@ -6,6 +6,7 @@ controller that answers one tick late, current loops, noise. Stiffness and dampi
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -14,11 +15,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from twin.control import CascadeGains, CurrentLoop, Encoders, SampledLoop, SampledPreloadCascade
-from twin.drives import RackPinionDrive, leipe_drive
-from twin.drives.leipe import RATED_TORQUE, TORQUE_LIMIT
+from twin.drives import AgainstStop, RackPinionDrive, RackPinionInputs, TorquePair, leipe_drive
+from twin.drives.leipe import GEAR_RATIO, PINION_DIAMETER, RATED_TORQUE, TORQUE_LIMIT
 from twin.laws import HarmonicForce, StribeckFriction
+from twin.plant import AbstractPlant
 from twin.record import Record
-from twin.references import AbstractReference, ConstantVelocity, SineSweep, SumReference
+from twin.references import AbstractReference, ConstantVelocity, SampledSignal, SineSweep, SumReference
 from twin.simulation import simulate
 from twin.stepping import ConstantSteps
 
@@ -36,6 +38,13 @@ CHANNELS = {
 """What the bench records."""
 TORQUE_NOISE = 0.02
 """Standard deviation of the noise on the torques, from the currents [Nm]."""
+TORQUE_CONSTANT = 1.5
+"""Chosen: torque per current of the motors [Nm/A]."""
+RESISTANCE = 1.0
+"""Chosen: resistance of a winding [Ohm]."""
+# Motor encoders of 24 bit behind the gearboxes, and a scale of 0.1 µm; all chosen.
+_MOTOR_STEP = 2 * np.pi / 2**24 * PINION_DIAMETER / (2 * GEAR_RATIO)
+_ENCODERS = {"position_1": _MOTOR_STEP, "position_2": _MOTOR_STEP, "table_position": 1e-7}
 
 
 def bench_gains(preload_percent: float | Array) -> CascadeGains:
@@ -67,10 +76,18 @@ def bench_loop(drive: RackPinionDrive, gains: CascadeGains, *, delayed: bool) ->
         gains: settings of the cascade.
         delayed: whether torques act one tick late.
     """
-    currents = CurrentLoop.tuned(
-        drive, torque_constant=1.5, resistance=1.0, inductance=0.01, bandwidth=400.0, voltage_limit=300.0
+    return SampledLoop(_currents(drive), SampledPreloadCascade(gains, position_every=4, delayed=delayed), PERIOD)
+
+
+def _currents(plant: AbstractPlant) -> CurrentLoop:
+    return CurrentLoop.tuned(
+        plant,
+        torque_constant=TORQUE_CONSTANT,
+        resistance=RESISTANCE,
+        inductance=0.01,
+        bandwidth=400.0,
+        voltage_limit=300.0,
     )
-    return SampledLoop(currents, SampledPreloadCascade(gains, position_every=4, delayed=delayed), PERIOD)
 
 
 def bench_drive() -> RackPinionDrive:
@@ -100,10 +117,7 @@ def bench(preload_percent: float) -> SampledLoop:
         InputError: a preload beyond the rated torque.
     """
     loop = bench_loop(bench_drive(), bench_gains(preload_percent), delayed=True)
-    # Motor encoders of 24 bit behind a ratio of 2.65 mm/rad, and a scale of 0.1 µm.
-    motor = float(2 * np.pi / 2**24 * bench_drive().travel_per_radian)
-    encoders = Encoders(loop.plant, {"position_1": motor, "position_2": motor, "table_position": 1e-7})
-    return dataclasses.replace(loop, plant=encoders)
+    return dataclasses.replace(loop, plant=Encoders(loop.plant, _ENCODERS))
 
 
 class Measurement(eqx.Module):
@@ -133,18 +147,39 @@ def measure(
     random = np.random.default_rng(seed)
     found = []
     for percent in preload_percents:
-        outputs = _run(bench(percent), reference, times)
-        channels = {name: np.asarray(getattr(outputs, name)) for name in CHANNELS}
-        for name in ("torque_1", "torque_2"):
-            channels[name] = channels[name] + TORQUE_NOISE * random.standard_normal(times.size)
-        record = Record.create(np.asarray(times), channels, CHANNELS, name=f"bench at {percent:g} % preload")
+        outputs = _run(bench(percent), reference, times, STEPPING)
+        record = _record(outputs, np.asarray(times), random, f"bench at {percent:g} % preload")
         found.append(Measurement(record, jnp.stack([outputs.force_1, outputs.force_2])))
     return found
 
 
+def measure_against_stop(highest_torque: float, duration: float, *, seed: int) -> Record:
+    """A record of motor 1 ramping its torque slowly up and down, on both sides, while the table rests against a stop.
+
+    Args:
+        highest_torque: torque at which the ramps turn [Nm].
+        duration: of the record [s].
+        seed: of the noise.
+    """
+    times = jnp.arange(round(duration / PERIOD)) * PERIOD
+    torque = highest_torque * jnp.interp(times / duration, jnp.linspace(0, 1, 5), jnp.asarray([0.0, 1, 0, -1, 0]))
+    stopped = AgainstStop(bench_drive(), stiffness=2e9, damping=1e5)
+    plant = Encoders(_currents(stopped), _ENCODERS)
+    signal = SampledSignal(times, RackPinionInputs(TorquePair(torque, 0 * torque), 0 * torque))
+    outputs = _run(plant, signal, times, ConstantSteps(substeps=2))
+    return _record(outputs, np.asarray(times), np.random.default_rng(seed), "bench against a stop")
+
+
+def _record(outputs: Any, times: np.ndarray, random: np.random.Generator, name: str) -> Record:
+    channels = {name: np.asarray(getattr(outputs, name)) for name in CHANNELS}
+    for torque in ("torque_1", "torque_2"):
+        channels[torque] = channels[torque] + TORQUE_NOISE * random.standard_normal(times.size)
+    return Record.create(times, channels, CHANNELS, name=name)
+
+
 @eqx.filter_jit
-def _run(loop: SampledLoop, reference: AbstractReference, times: Array):
-    trajectory = simulate(loop, reference, times, stepping=STEPPING)
+def _run(loop: Any, reference: AbstractReference, times: Array, stepping: ConstantSteps) -> Any:
+    trajectory = simulate(loop, reference, times, stepping=stepping)
     return jax.tree.map(jnp.asarray, trajectory.outputs)
 
 

@@ -46,6 +46,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(emps, _emps, "out/emps")
     bench = studies.add_parser("two-inertia", help="two-inertia bench: two-mass drive from its frequency response")
     _add_run(bench, _two_inertia, "out/two-inertia")
+    leipe = studies.add_parser("leipe", help="preloaded rack-and-pinion drive: load-dependent stiffness and damping")
+    _add_run(leipe, _leipe, "out/leipe")
     return parser
 
 
@@ -84,3 +86,9 @@ def _two_inertia(out: Path) -> str:
         for name, error in errors.items():
             lines.append(f"log-magnitude error {record}, {name}: median {error['median']:.4f}, rms {error['rms']:.4f}")
     return "\n".join([*lines, f"Results in {out}"])
+
+
+def _leipe(out: Path) -> str:
+    from fitting.identification.leipe_report import reproduce_leipe, tabulate
+
+    return f"{tabulate(reproduce_leipe(out))}\nResults in {out}"

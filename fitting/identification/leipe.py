@@ -38,7 +38,6 @@ from fitting.identification.preload_sweep import PreloadSweep
 from fitting.identification.static_stiffness import identify_static_stiffness
 from fitting.residuals.driven_table import DrivenTableResidual
 from fitting.residuals.load_surface import total_over_contacts
-from fitting.residuals.residual import JointResidual
 from fitting.residuals.trajectory import TrajectoryResidual
 from fitting.result import FitResult
 from twin.control import SampledLoop
@@ -189,8 +188,7 @@ def study_direct(found: SweepStudy, *, seed: int = 2) -> DirectStudy:
         position_deviation=1e-7,
         force_deviation=20.0,
     )
-    motions = JointResidual((swept, moved), ("sweeps", "moves"))
-    fits = fit_direct(responses, motions, start, motion_space(play=True))
+    fits = fit_direct(responses, {"sweeps": swept, "moves": moved}, start, motion_space(play=True))
     static = identify_static_stiffness(measure_against_stop(10.0, 6.0, seed=seed), drive, least_torque=0.5)
     return DirectStudy(fits, static, tuple(moves), move, preloads)
 

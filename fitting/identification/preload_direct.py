@@ -1,7 +1,7 @@
 """Load-dependent stiffness and damping at once: from all frequency responses, from motions, and from both."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -12,9 +12,10 @@ from fitting.fit import fit
 from fitting.identification.preload_sweep import PreloadSweep
 from fitting.residuals.driven_table import DrivenTableResidual
 from fitting.residuals.preloaded_response import PreloadedResponseResidual
-from fitting.residuals.residual import JointResidual
+from fitting.residuals.residual import AbstractResidual, JointResidual
 from fitting.residuals.weighted import Weighted
 from fitting.result import FitResult
+from fitting.uncertainty import correlation_time
 from twin._checks import InputError
 from twin.drives import DrivenTable, RackPinionDrive
 from twin.frf import FRF
@@ -22,6 +23,8 @@ from twin.laws import AbstractLoadLaw
 from twin.parameters import Parameter, ParameterSpace
 from twin.record import Record
 
+# Fits that only tell the scatter of each piece of evidence, and steps of each.
+_ROUNDS, _ROUGH = 2, 10
 _FIRST, _SECOND = "drive.train_1.mesh.", "drive.train_2.mesh."
 
 
@@ -138,38 +141,60 @@ def cut(record: Record, begin: float, end: float) -> Record:
 
 @dataclasses.dataclass(frozen=True)
 class DirectFits:
-    """The same laws from three kinds of evidence; the model of each is a `DrivenTable`."""
+    """The same laws from three kinds of evidence; the model of each is a `DrivenTable`.
+
+    Every piece of evidence is weighted by the scatter that it shows about its own fit, as many independent samples as
+    its correlation leaves: what a model does not know, such as cogging, hangs together over thousands of samples.
+    """
 
     frf: FitResult
     """From the frequency responses of all preloads."""
     time: FitResult
     """From motions."""
     joint: FitResult
-    """From both, each weighted by the scatter that it showed alone; its intervals are those of the weights."""
+    """From both."""
 
 
 def fit_direct(
-    frf: PreloadedResponseResidual,
-    time: DrivenTableResidual,
-    start: DrivenTable,
-    space: ParameterSpace,
+    frf: PreloadedResponseResidual, time: Mapping[str, DrivenTableResidual], start: DrivenTable, space: ParameterSpace
 ) -> DirectFits:
     """Fit the laws to responses, to motions, and to both.
 
     Args:
         frf: evidence from responses.
-        time: evidence from motions.
+        time: evidence from motions, by name.
         start: model to start from.
         space: what is free where motions take part, as `motion_space`.
 
     Raises:
-        InputError: as `fitting.fit.fit`.
+        InputError: no motion, or as `fitting.fit.fit`.
     """
-    responses = fit(frf, start, mesh_space())
-    motions = fit(time, start, space)
-    parts = (Weighted(frf, _rms(responses)), Weighted(time, _rms(motions)))
-    joint = fit(JointResidual(parts, ("responses", "motions")), motions.model, space, variance="known")
-    return DirectFits(responses, motions, joint)
+    if not time:
+        raise InputError("There is no motion to fit to. Give at least one DrivenTableResidual by name.")
+    names, motions = tuple(time), list(time.values())
+    # All fits of a kind share one compiled program: they differ in their weights.
+    first = fit(Weighted(frf, 1.0), start, mesh_space())
+    responses = _weighted(frf, first)
+    result_frf = fit(responses, first.model, mesh_space(), variance="known")
+    weighted, model = tuple(Weighted(part, 1.0) for part in motions), start
+    for _ in range(_ROUNDS):
+        rough = fit(JointResidual(weighted, names), model, space, max_steps=_ROUGH)
+        weighted, model = tuple(_weighted(part, rough) for part in motions), rough.model
+    result_time = fit(JointResidual(weighted, names), model, space, variance="known")
+    parts = JointResidual((responses, *weighted), ("responses", *names))
+    joint = fit(parts, result_time.model, space, variance="known")
+    return DirectFits(result_frf, result_time, joint)
+
+
+def _weighted(part: PreloadedResponseResidual | DrivenTableResidual, result: FitResult) -> Weighted:
+    """Evidence over the scatter that it shows, for as many independent samples as its correlation leaves."""
+    series = np.asarray(part.series(_evaluated(part, result.model)))
+    return Weighted(part, float(np.sqrt(np.mean(series**2) * correlation_time(series))))
+
+
+@eqx.filter_jit
+def _evaluated(part: AbstractResidual, model: DrivenTable) -> Array:
+    return part(model)
 
 
 def curve_errors(
@@ -185,8 +210,3 @@ def curve_errors(
     at = jnp.asarray(forces)
     one, other = found.train_1.mesh, truth.train_1.mesh
     return one.stiffness(at) / other.stiffness(at) - 1, one.damping(at) / other.damping(at) - 1
-
-
-def _rms(result: FitResult) -> float:
-    """Standard deviation that the residual shows, degrees of freedom counted."""
-    return float(np.sqrt(np.sum(result.residual**2) / result.degrees_of_freedom))

@@ -132,6 +132,15 @@ class DrivenTableResidual(AbstractResidual):
             ]
         )
 
+    def series(self, values: Float[Array, "residuals"]) -> Float[Array, "records samples"]:
+        """The part of a residual that is about table positions, one row for each record.
+
+        Args:
+            values: what calling this evidence returned.
+        """
+        records = self.table_position.shape[0]
+        return values[:-records].reshape(records, -1)
+
 
 def _spline(times: np.ndarray, position: np.ndarray) -> SampledReference:
     spline = CubicSpline(times, position)

@@ -54,3 +54,11 @@ class PreloadedResponseResidual(AbstractResidual):
 
         error = (jax.vmap(one)(self.forces) - self.values) / jnp.sqrt(self.variance / 2)
         return jnp.concatenate([jnp.real(error).ravel(), jnp.imag(error).ravel()])
+
+    def series(self, values: Float[Array, "residuals"]) -> Float[Array, "rows lines"]:
+        """A residual by lines, one row for each preload and part, real and imaginary.
+
+        Args:
+            values: what calling this evidence returned.
+        """
+        return values.reshape(-1, self.frequency.size)

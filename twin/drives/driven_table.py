@@ -6,8 +6,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
-from twin._checks import as_scalar, finite
+from twin._checks import InputError, as_scalar, finite
 from twin.drives.rack_pinion import RackPinionDrive
+from twin.laws import SecantMesh
 from twin.plant import AbstractPlant
 
 
@@ -59,8 +60,11 @@ class DrivenTable(AbstractPlant):
     """m·ẍ_T = F₁ + F₂ + load - F_f(ẋ_T), with F₁ and F₂ from the meshes between measured motors and the table.
 
     What moves the motors (controllers, currents, their own friction and inertia) does not enter: a fit to the table's
-    motion sees mass, guides and meshes alone. Takes meshes whose force does not depend on the motor's torque, as
-    `TangentMesh`; the motor's force is put to zero.
+    motion sees mass, guides and meshes alone. Its meshes must not read the motor's torque, which is not known here:
+    `TangentMesh`, not `SecantMesh`, unless the table only carries a drive and is never simulated.
+
+    Raises:
+        InputError: when simulated with a mesh that reads the motor's torque.
     """
 
     drive: RackPinionDrive
@@ -102,6 +106,11 @@ class DrivenTable(AbstractPlant):
     def _forces(self, state: Any, motion: Any) -> tuple[Array, Array]:
         x, v = state.table_position, state.table_velocity
         one, two = self.drive.train_1.mesh, self.drive.train_2.mesh
+        if isinstance(one, SecantMesh) or isinstance(two, SecantMesh):
+            raise InputError(
+                "A mesh of the driven table is a SecantMesh, whose force depends on the motor's torque; but only the "
+                "motors' motion is known here. Use a TangentMesh, or simulate the whole drive."
+            )
         return (
             one.force(motion.position_1 - x - self.zero_1, motion.velocity_1 - v, 0.0),
             two.force(motion.position_2 - x - self.zero_2, motion.velocity_2 - v, 0.0),

@@ -76,12 +76,12 @@ def steady_motion(
         InputError: if a friction law has memory.
     """
     torques = preloaded_torques(drive, preload, velocity=velocity, load=load)
-    forces = mesh_forces(drive, jnp.stack(torques), velocity)
+    forces, loads = mesh_forces(drive, jnp.stack(torques), velocity), drive.motor_force(jnp.stack(torques))
     r = drive.travel_per_radian
     speed, zero = jnp.asarray(velocity / r), jnp.zeros(())
     state = RackPinionState(
-        drive.train_1.mesh.deflection(forces[0]) / r,
-        drive.train_2.mesh.deflection(forces[1]) / r,
+        drive.train_1.mesh.deflection(forces[0], loads[0]) / r,
+        drive.train_2.mesh.deflection(forces[1], loads[1]) / r,
         zero,
         speed,
         speed,

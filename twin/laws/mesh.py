@@ -48,11 +48,12 @@ class AbstractMesh(eqx.Module):
         """
 
     @abc.abstractmethod
-    def deflection(self, force: Float[ArrayLike, ""]) -> Float[Array, ""]:
-        """Deflection that rests under a force, the motor's force being the same [m]: inverse of `force`.
+    def deflection(self, force: Float[ArrayLike, ""], load: Float[ArrayLike, ""] | None = None) -> Float[Array, ""]:
+        """Deflection that rests under a force [m]: inverse of `force`.
 
         Args:
             force: force through the mesh [N]; at zero the middle of the play is meant.
+            load: force of the motor [N]; the force through the mesh if it is not given.
         """
 
 
@@ -106,11 +107,12 @@ class TangentMesh(AbstractMesh):
         reach = smooth_abs(self.backlash(deflection), width) ** (power + 1) - width ** (power + 1)
         return scale * reach / (power + 1)
 
-    def deflection(self, force: Float[ArrayLike, ""]) -> Float[Array, ""]:
+    def deflection(self, force: Float[ArrayLike, ""], load: Float[ArrayLike, ""] | None = None) -> Float[Array, ""]:
+        del load
         scale, power, _ = self._law()
         # To the right of the answer, from where Newton's steps go straight to it, as the force is convex.
         indentation = (smooth_abs(force, self.stiffness.width) / scale) ** (1 / power)
-        return _resting(lambda mesh, delta: mesh.elastic(delta), self, force, indentation)
+        return _resting(lambda mesh, delta: mesh.elastic(delta), self, self, force, indentation)
 
     def _elastic(self, deflection: ArrayLike) -> tuple[Array, Array]:
         scale, power, width = self._law()
@@ -144,12 +146,15 @@ class SecantMesh(AbstractMesh):
         elastic = self.stiffness(load) * self.backlash(deflection)
         return elastic + self.damping(load) * self.backlash.contact(deflection) * rate
 
-    def deflection(self, force: Float[ArrayLike, ""]) -> Float[Array, ""]:
-        indentation = smooth_abs(force, _LEAST_FORCE) / self.stiffness(force)
-        return _resting(lambda mesh, delta: mesh.stiffness(force) * mesh.backlash(delta), self, force, indentation)
+    def deflection(self, force: Float[ArrayLike, ""], load: Float[ArrayLike, ""] | None = None) -> Float[Array, ""]:
+        stiffness = self.stiffness(force if load is None else load)
+        indentation = smooth_abs(force, _LEAST_FORCE) / stiffness
+        return _resting(
+            lambda given, delta: given[0] * given[1](delta), (stiffness, self.backlash), self, force, indentation
+        )
 
 
-def _resting(elastic: Callable, mesh: AbstractMesh, force: ArrayLike, indentation: Array) -> Float[Array, ""]:
+def _resting(elastic: Callable, law: Any, mesh: AbstractMesh, force: ArrayLike, indentation: Array) -> Float[Array, ""]:
     """The deflection at which the elastic force is a given one; differentiable by the implicit function theorem."""
     target = jnp.asarray(force)
     reach = jax.lax.stop_gradient(indentation + 0.5 * mesh.backlash.play + 2 * mesh.backlash.width)
@@ -161,4 +166,4 @@ def _resting(elastic: Callable, mesh: AbstractMesh, force: ArrayLike, indentatio
 
     start = smooth_sign(jax.lax.stop_gradient(target), _LEAST_FORCE)
     solver = optx.Newton(rtol=_ACCURACY, atol=_ACCURACY)
-    return reach * optx.root_find(excess, solver, start, (mesh, target), max_steps=100, throw=False).value
+    return reach * optx.root_find(excess, solver, start, (law, target), max_steps=100, throw=False).value

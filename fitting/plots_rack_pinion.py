@@ -52,9 +52,23 @@ def plot_preload_responses(
         ax.set_xscale("log")
         ax.margins(x=0)
         ax.grid(True, which="both", color="0.92", lw=0.6)
+        plain_ticks(ax, [20, 30, 40, 60, 80, 100, 150, 200, 300, 400])
     grid[0].legend(title="preload", fontsize="small", ncols=2)
     grid[1].set_xlabel("frequency [Hz]")
     return grid
+
+
+def plain_ticks(ax: "Axes", places: Sequence[float]) -> None:
+    """Plain numbers at some places of a logarithmic abscissa, which keeps its limits.
+
+    Args:
+        ax: the axes.
+        places: where ticks are wanted; those outside of the limits are left out.
+    """
+    low, high = ax.get_xlim()
+    inside = [place for place in places if low <= place <= high]
+    ax.set_xticks(inside, [f"{place:g}" for place in inside])
+    ax.set_xticks([], minor=True)
 
 
 def plot_load_surface(
@@ -63,7 +77,7 @@ def plot_load_surface(
     totals: Float[ArrayLike, "points"],
     *,
     label: str,
-    unit: str,
+    scale: float = 1.0,
     ax: "Axes | None" = None,
 ) -> "Axes":
     """The fitted total over both motor forces with the measured points (Leipe et al., fig. 6 and 7).
@@ -74,8 +88,8 @@ def plot_load_surface(
         found: the fitted law.
         forces: motor forces of the points [N].
         totals: measured totals, SI.
-        label: what it is.
-        unit: its SI unit.
+        label: what it is, with its unit.
+        scale: what the unit is in SI, 1e6 for N/µm.
         ax: three-dimensional axes to draw in; new ones if not given.
     """
     from matplotlib import pyplot
@@ -87,8 +101,6 @@ def plot_load_surface(
     side = np.linspace(0.0, highest, 41)
     f_1, f_2 = np.meshgrid(side, side)
     surface = np.asarray(total_over_contacts(found.law, jnp.stack([1e3 * f_1, 1e3 * f_2])))
-    power = 3 * int(np.floor(np.log10(np.max(surface)) / 3))
-    scale = 10.0**power
     three: "Axes" = ax
     three.plot_surface(f_1, f_2, surface / scale, cmap="viridis", alpha=0.6, lw=0)  # type: ignore[attr-defined]
     single = np.asarray(found.law(1e3 * side)) / scale
@@ -97,8 +109,7 @@ def plot_load_surface(
     three.plot(at[0], at[1], total / scale, "ko", ms=4, ls="none", label="measured")  # type: ignore[arg-type]
     three.set_xlabel("|F₁| [kN]")
     three.set_ylabel("|F₂| [kN]")
-    prefix = "" if power == 0 else f"10^{power} "
-    three.set_zlabel(f"{label} [{prefix}{unit}]")  # type: ignore[attr-defined]
+    three.set_zlabel(label)  # type: ignore[attr-defined]
     three.set_title(f"remaining error {found.error_percent:.2f} %", fontsize="medium")
     three.legend(loc="upper left", fontsize="small")
     return three

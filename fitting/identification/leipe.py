@@ -185,7 +185,7 @@ def study_direct(found: SweepStudy, *, seed: int = 2) -> DirectStudy:
     moved = DrivenTableResidual.create(
         [cut(m.record, _MOVE_START - 0.05, _MOVE_START + float(move.duration()) + 0.3) for m in moves],
         r,
-        position_deviation=1e-7,
+        position_deviation=3e-6,
         force_deviation=20.0,
     )
     fits = fit_direct(responses, {"sweeps": swept, "moves": moved}, start, motion_space(play=True))

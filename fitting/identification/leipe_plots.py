@@ -16,7 +16,7 @@ from fitting.identification.leipe import (
 )
 from fitting.identification.leipe_bench import bench_drive
 from fitting.plots import plot_comparison, save_figure
-from fitting.plots_rack_pinion import plot_load_surface, plot_preload_responses, plot_quadrants
+from fitting.plots_rack_pinion import plain_ticks, plot_load_surface, plot_preload_responses, plot_quadrants
 
 
 def draw_all(out: Path, curves: CurveFits, sweeps: SweepStudy, direct: DirectStudy, validation: Validation) -> None:
@@ -34,12 +34,12 @@ def draw_all(out: Path, curves: CurveFits, sweeps: SweepStudy, direct: DirectStu
     save_figure(quadrants.figure, out / "fig5_quadrants.png")
     used = [p for p in sweeps.exact.points if p.used and p.peak is not None]
     forces = np.asarray([p.forces for p in used]).T
-    for figure, fit, field, unit in (
-        ("fig6_stiffness", sweeps.exact.stiffness, "stiffness", "N/m"),
-        ("fig7_damping", sweeps.exact.damping, "damping", "Ns/m"),
+    for figure, fit, field, unit, scale in (
+        ("fig6_stiffness", sweeps.exact.stiffness, "stiffness", "N/µm", 1e6),
+        ("fig7_damping", sweeps.exact.damping, "damping", "kNs/m", 1e3),
     ):
-        totals = [getattr(p.peak, field) for p in used]
-        surface = plot_load_surface(fit, forces, totals, label=f"total {field}", unit=unit)
+        totals = np.asarray([getattr(p.peak, field) for p in used])
+        surface = plot_load_surface(fit, forces, totals, label=f"total {field} [{unit}]", scale=scale)
         save_figure(surface.figure, out / f"{figure}.png")
     _draw_validation(out / "fig8_validation.png", validation)
     _draw_curves(out / "curves.png", sweeps, direct)
@@ -97,6 +97,7 @@ def _draw_curves(path: Path, sweeps: SweepStudy, direct: DirectStudy) -> None:
         ax.set_xscale("log")
         ax.margins(x=0)
     axes[0].legend(fontsize="small", ncols=2)
+    plain_ticks(axes[1], [250, 500, 1000, 2000, 5000])
     axes[1].set_xlabel("force through the mesh [N]")
     save_figure(figure, path)
 

@@ -5,9 +5,11 @@ import time
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from fitting.identification.leipe import (
     RATED_TORQUE,
@@ -26,9 +28,10 @@ from fitting.identification.leipe_bench import PERIOD, bench_drive
 from fitting.identification.leipe_plots import draw_all
 from fitting.identification.load_surface import LoadSurfaceFit
 from fitting.identification.particle_swarm import SwarmResult, particle_swarm
-from fitting.identification.preload_direct import curve_errors
+from fitting.identification.preload_direct import curve_errors, curve_intervals
 from fitting.result import FitResult
 from twin.control import mesh_forces_of_motion, reconstruct_table_position
+from twin.drives import RackPinionDrive
 from twin.drives.rack_pinion_operation import table_response
 from twin.io.parameter_file import ParameterEntry, write_parameters
 
@@ -56,7 +59,8 @@ def reproduce_leipe(out: Path) -> dict[str, Any]:
     validation = validate(direct)
     summary = summarise(curves, sweeps, direct, validation)
     summary["seconds"] = time.perf_counter() - clock
-    (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    text = json.dumps(_without_nan(summary), indent=2, allow_nan=False)
+    (out / "summary.json").write_text(text + "\n", encoding="utf-8")
     write_parameters(out / "parameters.toml", _entries(direct.fits.joint) + _entries(validation.motors))
     draw_all(out, curves, sweeps, direct, validation)
     return summary
@@ -96,6 +100,15 @@ def summarise(curves: CurveFits, sweeps: SweepStudy, direct: DirectStudy, valida
         "reconstruction_um": _reconstruction(direct, validation),
         "preload_choice": _choices(validation),
     }
+
+
+def _without_nan(value: Any) -> Any:
+    """What JSON can hold: numbers that are not finite become null."""
+    if isinstance(value, dict):
+        return {key: _without_nan(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(entry) for entry in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def tabulate(summary: dict[str, Any]) -> str:
@@ -171,7 +184,7 @@ def _linearised(sweeps: SweepStudy) -> list[dict[str, float]]:
     for measurement, point in zip(sweeps.measurements, sweeps.exact.points, strict=True):
         response = point.response.between(60.0, 140.0)
         forces = jnp.mean(measurement.forces[:, first:], axis=1)
-        model = np.asarray(table_response(bench_drive(), forces, response.frequency, velocity=0.005)).sum(axis=0)
+        model = np.asarray(_linear_response(bench_drive(), forces, response.frequency)).sum(axis=0)
         error = np.abs(np.asarray(response.values[0, 0]) - model)
         deviation = np.sqrt(np.asarray(response.variance)[0, 0])
         rows.append(
@@ -184,6 +197,11 @@ def _linearised(sweeps: SweepStudy) -> list[dict[str, float]]:
     return rows
 
 
+@eqx.filter_jit
+def _linear_response(drive: RackPinionDrive, forces: Array, frequency: Array) -> Array:
+    return table_response(drive, forces, frequency, velocity=0.005)
+
+
 def _direct(result: FitResult) -> dict[str, Any]:
     k, d = curve_errors(result.model.drive, bench_drive(), _FORCES)
     return {
@@ -191,16 +209,14 @@ def _direct(result: FitResult) -> dict[str, Any]:
         "largest_stiffness_error_percent": 100 * float(jnp.max(jnp.abs(k))),
         "largest_damping_error_percent": 100 * float(jnp.max(jnp.abs(d))),
         "force_range_n": [float(_FORCES[0]), float(_FORCES[-1])],
+        "largest_interval_percent": curve_intervals(result, _FORCES),
         "status": result.message,
     }
 
 
 def _parameters(result: FitResult) -> dict[str, Any]:
     ends = dict(zip(result.space.paths, result.intervals().tolist(), strict=True))
-    return {
-        path: {**estimate._asdict(), "interval_95": [x if np.isfinite(x) else None for x in ends[path]]}
-        for path, estimate in result.estimates().items()
-    }
+    return {path: {**e._asdict(), "interval_95": ends[path]} for path, e in result.estimates().items()}
 
 
 def swarms(sweeps: SweepStudy) -> dict[str, tuple[SwarmResult, int]]:

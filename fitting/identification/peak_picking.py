@@ -83,7 +83,8 @@ def pick_peak(
 
 def _crossing(f: np.ndarray, g: np.ndarray, band: tuple[float, float]) -> tuple[float, float]:
     """Frequency and magnitude at the -90° point next to the highest magnitude; the response is smoothed about it."""
-    falls = np.flatnonzero((g.real[:-1] > 0) & (g.real[1:] <= 0) & (g.imag[:-1] < 0))
+    real, imaginary = np.real(g), np.imag(g)
+    falls = np.flatnonzero((real[:-1] > 0) & (real[1:] <= 0) & (imaginary[:-1] < 0))
     if falls.size == 0:
         where = f"from {f[0]:g} to {f[-1]:g} Hz" if f.size else f"between {band[0]:g} and {band[1]:g} Hz"
         raise InputError(
@@ -92,16 +93,16 @@ def _crossing(f: np.ndarray, g: np.ndarray, band: tuple[float, float]) -> tuple[
         )
     first = falls[np.argmax(np.abs(g[falls]))]
     low, high = max(0, first - _NEIGHBOURS + 1), min(f.size, first + _NEIGHBOURS + 1)
-    part = g.real[first] / (g.real[first] - g.real[first + 1])
+    part = real[first] / (real[first] - real[first + 1])
     start = f[first] + part * (f[first + 1] - f[first])
     if high - low < 4:
         return float(start), float(abs(g[first] + part * (g[first + 1] - g[first])))
     scale = f[high - 1] - f[low]
     basis = ((f[low:high] - start) / scale)[:, None] ** np.arange(3)
     coefficients, *_ = np.linalg.lstsq(basis.astype(complex), g[low:high], rcond=None)
-    roots = np.roots(coefficients.real[::-1])
-    real = roots.real[np.abs(roots.imag) < 1e-9]
-    nearest = real[np.argmin(np.abs(real))] if real.size else 0.0
+    roots = np.roots(np.real(coefficients)[::-1])
+    places = np.real(roots)[np.abs(np.imag(roots)) < 1e-9]
+    nearest = places[np.argmin(np.abs(places))] if places.size else 0.0
     nearest = float(np.clip(nearest, -0.5, 0.5))
     smooth = coefficients @ nearest ** np.arange(3)
     return float(start + scale * nearest), float(abs(smooth))

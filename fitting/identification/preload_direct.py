@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -12,7 +13,7 @@ from fitting.fit import fit
 from fitting.identification.preload_sweep import PreloadSweep
 from fitting.residuals.driven_table import DrivenTableResidual
 from fitting.residuals.preloaded_response import PreloadedResponseResidual
-from fitting.residuals.residual import AbstractResidual, JointResidual
+from fitting.residuals.residual import JointResidual
 from fitting.residuals.weighted import Weighted
 from fitting.result import FitResult
 from fitting.uncertainty import correlation_time
@@ -23,8 +24,8 @@ from twin.laws import AbstractLoadLaw
 from twin.parameters import Parameter, ParameterSpace
 from twin.record import Record
 
-# Fits that only tell the scatter of each piece of evidence, and steps of each.
-_ROUNDS, _ROUGH = 2, 10
+# Fits to motions after the first one, each weighted by the scatter about the one before.
+_ROUNDS = 2
 _FIRST, _SECOND = "drive.train_1.mesh.", "drive.train_2.mesh."
 
 
@@ -171,30 +172,62 @@ def fit_direct(
     """
     if not time:
         raise InputError("There is no motion to fit to. Give at least one DrivenTableResidual by name.")
-    names, motions = tuple(time), list(time.values())
-    # All fits of a kind share one compiled program: they differ in their weights.
-    first = fit(Weighted(frf, 1.0), start, mesh_space())
-    responses = _weighted(frf, first)
-    result_frf = fit(responses, first.model, mesh_space(), variance="known")
-    weighted, model = tuple(Weighted(part, 1.0) for part in motions), start
+    names, evidence = ("responses", *time), (frf, *time.values())
+    only_motions = [path for path in space.paths if path not in mesh_space().paths]
+    silent = [np.inf] * len(time)
+
+    def run(weights: Sequence[float], model: DrivenTable, hold: Sequence[str] = ()) -> FitResult:
+        # One compiled program for all: what does not count has no weight.
+        parts = JointResidual(tuple(map(Weighted, evidence, weights)), names)
+        return fit(parts, model, space, hold=hold, variance="known")
+
+    responses = run([1.0, *silent], start, only_motions)
+    scatter = _scatter(evidence, responses, [1.0, *silent])[:1]
+    responses = run([*scatter, *silent], responses.model, only_motions)
+    weights = [np.inf] + [1.0] * len(time)
+    motions = run(weights, start)
     for _ in range(_ROUNDS):
-        rough = fit(JointResidual(weighted, names), model, space, max_steps=_ROUGH)
-        weighted, model = tuple(_weighted(part, rough) for part in motions), rough.model
-    result_time = fit(JointResidual(weighted, names), model, space, variance="known")
-    parts = JointResidual((responses, *weighted), ("responses", *names))
-    joint = fit(parts, result_time.model, space, variance="known")
-    return DirectFits(result_frf, result_time, joint)
+        weights = [np.inf, *_scatter(evidence, motions, weights)[1:]]
+        motions = run(weights, motions.model)
+    joint = run([*scatter, *weights[1:]], motions.model)
+    return DirectFits(responses, motions, joint)
 
 
-def _weighted(part: PreloadedResponseResidual | DrivenTableResidual, result: FitResult) -> Weighted:
-    """Evidence over the scatter that it shows, for as many independent samples as its correlation leaves."""
-    series = np.asarray(part.series(_evaluated(part, result.model)))
-    return Weighted(part, float(np.sqrt(np.mean(series**2) * correlation_time(series))))
+def _scatter(
+    evidence: Sequence[PreloadedResponseResidual | DrivenTableResidual], result: FitResult, weights: Sequence[float]
+) -> list[float]:
+    """Rms of what a fit leaves of each piece, raised for the samples that its correlation takes away."""
+    found, first = [], 0
+    for part, weight in zip(evidence, weights, strict=True):
+        values = result.residual[first : first + part.rows]
+        first += part.rows
+        if np.isinf(weight):
+            found.append(np.inf)
+            continue
+        series = weight * np.asarray(part.series(jnp.asarray(values)))
+        found.append(float(np.sqrt(np.mean(series**2) * correlation_time(series))))
+    return found
 
 
-@eqx.filter_jit
-def _evaluated(part: AbstractResidual, model: DrivenTable) -> Array:
-    return part(model)
+def curve_intervals(result: FitResult, forces: Float[np.ndarray, "points"]) -> dict[str, float]:
+    """Widest half 95 % intervals of k(F) and d(F) over some forces, relative to the curves [%], to first order.
+
+    Args:
+        result: fit of a `DrivenTable`.
+        forces: forces [N].
+    """
+    at = jnp.asarray(forces)
+
+    def curves(scaled: Array) -> Array:
+        mesh = result.space.unpack(result.model, scaled).drive.train_1.mesh
+        return jnp.stack([jnp.log(mesh.stiffness(at)), jnp.log(mesh.damping(at))])
+
+    slopes = np.asarray(jax.jacfwd(curves)(jnp.asarray(result.scaled)))
+    # What sits on a bound has no variance of its own.
+    covariance = np.nan_to_num(result.scaled_covariance)
+    deviation = np.sqrt(np.einsum("cfp,pq,cfq->cf", slopes, covariance, slopes))
+    stiffness, damping = 196.0 * np.max(deviation, axis=1)
+    return {"stiffness": float(stiffness), "damping": float(damping)}
 
 
 def curve_errors(

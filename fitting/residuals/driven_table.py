@@ -132,6 +132,12 @@ class DrivenTableResidual(AbstractResidual):
             ]
         )
 
+    @property
+    def rows(self) -> int:
+        """Length of the residual."""
+        records, samples = self.table_position.shape
+        return records * (samples - self.settled) + records
+
     def series(self, values: Float[Array, "residuals"]) -> Float[Array, "records samples"]:
         """The part of a residual that is about table positions, one row for each record.
 

@@ -55,6 +55,11 @@ class PreloadedResponseResidual(AbstractResidual):
         error = (jax.vmap(one)(self.forces) - self.values) / jnp.sqrt(self.variance / 2)
         return jnp.concatenate([jnp.real(error).ravel(), jnp.imag(error).ravel()])
 
+    @property
+    def rows(self) -> int:
+        """Length of the residual."""
+        return 2 * self.values.size
+
     def series(self, values: Float[Array, "residuals"]) -> Float[Array, "rows lines"]:
         """A residual by lines, one row for each preload and part, real and imaginary.
 

@@ -6,14 +6,14 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from fitting.residuals.residual import AbstractResidual
-from twin._checks import as_scalar, positive
+from twin._checks import above_zero, as_scalar
 
 
 class Weighted(AbstractResidual):
-    """A residual over a common factor of its standard deviations.
+    """A residual over a common factor of its standard deviations. An infinite one leaves the evidence out.
 
     Raises:
-        InputError: if the factor is not positive.
+        InputError: if the factor is not above zero.
     """
 
     residual: AbstractResidual
@@ -22,7 +22,7 @@ class Weighted(AbstractResidual):
     """By how much all of its standard deviations are too small [-]; the rms that its own fit leaves."""
 
     def __check_init__(self):
-        positive("deviation", self.deviation)
+        above_zero("deviation", self.deviation)
 
     def __call__(self, model: Any) -> Float[Array, "residuals"]:
         return self.residual(model) / self.deviation

@@ -2,11 +2,12 @@
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, ArrayLike, Float
 
-from twin._checks import InputError, is_concrete, positive
+from twin._checks import InputError, as_scalar, is_concrete, positive
 from twin.drives.rack_pinion import RackPinionDrive
 from twin.drives.rack_pinion_operation import mesh_forces, preloaded_torques
 
@@ -86,13 +87,9 @@ def preload_for_stiffness(
         ("resistance", resistance, "Ohm"),
     ):
         positive(name, value, unit)
-    r = drive.travel_per_radian
-    bare = jnp.stack(preloaded_torques(drive, 0.0, velocity=velocity, load=load))
-    through = mesh_forces(drive, bare, velocity)
-    # Without preload both flanks carry the same; this much is needed to bring one of them to its reserve.
-    least = r * (jnp.max(jnp.abs(through)) + reserve)
-    most = rated_torque - jnp.max(jnp.abs(bare))
-    best = total_stiffness(drive, most, load=load, velocity=velocity)
+    given = (drive, as_scalar(load), as_scalar(velocity))
+    loss = as_scalar(resistance / torque_constant**2)
+    least, most, best, choice = _choose(given, as_scalar(stiffness), as_scalar(rated_torque), as_scalar(reserve), loss)
     if is_concrete(least) and is_concrete(most) and float(least) > float(most):
         raise InputError(
             f"The load leaves no room for a preload: {float(least):.3g} Nm are needed to keep both flanks, but only "
@@ -103,12 +100,31 @@ def preload_for_stiffness(
             f"stiffness of {stiffness:.4g} N/m cannot be reached: with the rated torque it is {float(best):.4g} N/m. "
             "Ask for less."
         )
+    return choice
+
+
+@eqx.filter_jit
+def _choose(
+    given: tuple[RackPinionDrive, Array, Array],
+    stiffness: Array,
+    rated_torque: Array,
+    reserve: Array,
+    loss: Array,
+) -> tuple[Array, Array, Array, PreloadChoice]:
+    """Least and largest preload, stiffness at the latter, and the choice between."""
+    drive, load, velocity = given
+    r = drive.travel_per_radian
+    bare = jnp.stack(preloaded_torques(drive, 0.0, velocity=velocity, load=load))
+    through = mesh_forces(drive, bare, velocity)
+    # Without preload both flanks carry the same; this much is needed to bring one of them to its reserve.
+    least = r * (jnp.max(jnp.abs(through)) + reserve)
+    most = rated_torque - jnp.max(jnp.abs(bare))
+    best = total_stiffness(drive, most, load=load, velocity=velocity)
 
     def missing(preload: Array, given: tuple) -> Array:
         drive, load, velocity = given
         return total_stiffness(drive, preload, load=load, velocity=velocity) / stiffness - 1
 
-    given = (drive, jnp.asarray(load, dtype=jnp.float64), jnp.asarray(velocity, dtype=jnp.float64))
     enough = total_stiffness(drive, least, load=load, velocity=velocity) >= stiffness
     solver = optx.Bisection(rtol=_ACCURACY, atol=_ACCURACY, expand_if_necessary=True)
     found = optx.root_find(
@@ -116,8 +132,7 @@ def preload_for_stiffness(
     ).value
     preload = jnp.where(enough, least, found)
     torques = bare + jnp.stack([preload, -preload])
-    loss = resistance / torque_constant**2
-    return PreloadChoice(
+    choice = PreloadChoice(
         preload=preload,
         torques=torques,
         forces=mesh_forces(drive, torques, velocity),
@@ -125,3 +140,4 @@ def preload_for_stiffness(
         copper_loss=loss * jnp.sum(torques**2),
         extra_loss=loss * jnp.sum(torques**2 - bare**2),
     )
+    return least, most, best, choice

@@ -112,7 +112,7 @@ class TangentMesh(AbstractMesh):
         scale, power, _ = self._law()
         # To the right of the answer, from where Newton's steps go straight to it, as the force is convex.
         indentation = (smooth_abs(force, self.stiffness.width) / scale) ** (1 / power)
-        return _resting(lambda mesh, delta: mesh.elastic(delta), self, self, force, indentation)
+        return _resting(_tangent_force, self, self.backlash, jnp.asarray(force), indentation)
 
     def _elastic(self, deflection: ArrayLike) -> tuple[Array, Array]:
         scale, power, width = self._law()
@@ -149,15 +149,25 @@ class SecantMesh(AbstractMesh):
     def deflection(self, force: Float[ArrayLike, ""], load: Float[ArrayLike, ""] | None = None) -> Float[Array, ""]:
         stiffness = self.stiffness(force if load is None else load)
         indentation = smooth_abs(force, _LEAST_FORCE) / stiffness
-        return _resting(
-            lambda given, delta: given[0] * given[1](delta), (stiffness, self.backlash), self, force, indentation
-        )
+        law = (stiffness, self.backlash)
+        return _resting(_secant_force, law, self.backlash, jnp.asarray(force), indentation)
 
 
-def _resting(elastic: Callable, law: Any, mesh: AbstractMesh, force: ArrayLike, indentation: Array) -> Float[Array, ""]:
+def _tangent_force(mesh: TangentMesh, deflection: Array) -> Array:
+    return mesh.elastic(deflection)
+
+
+def _secant_force(law: tuple[Array, Backlash], deflection: Array) -> Array:
+    stiffness, backlash = law
+    return stiffness * backlash(deflection)
+
+
+@eqx.filter_jit
+def _resting(
+    elastic: Callable, law: Any, backlash: Backlash, target: Float[Array, ""], indentation: Float[Array, ""]
+) -> Float[Array, ""]:
     """The deflection at which the elastic force is a given one; differentiable by the implicit function theorem."""
-    target = jnp.asarray(force)
-    reach = jax.lax.stop_gradient(indentation + 0.5 * mesh.backlash.play + 2 * mesh.backlash.width)
+    reach = jax.lax.stop_gradient(indentation + 0.5 * backlash.play + 2 * backlash.width)
     magnitude = jax.lax.stop_gradient(smooth_abs(target, _LEAST_FORCE))
 
     def excess(part: Array, given: Any) -> Array:

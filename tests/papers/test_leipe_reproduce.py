@@ -1,4 +1,4 @@
-"""Leipe et al. on the simulated bench, as the command line repeats it: each figure of merit of the paper, and beyond."""
+"""Leipe et al. on the simulated bench, as the command line repeats it: each figure of merit, and beyond."""
 
 import json
 import subprocess

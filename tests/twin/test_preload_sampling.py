@@ -136,3 +136,8 @@ def test_bad_gains_are_named(change, named):
 def test_position_ticks_are_counted_from_one():
     with pytest.raises(InputError, match="position_every must be at least 1"):
         SampledPreloadCascade(gains(), 0)
+
+
+def test_preload_loop_that_swings_up_is_refused():
+    with pytest.raises(InputError, match="must stay below 1"):
+        SampledPreloadCascade(gains(preload_gain=2e-3, velocity_gain=700.0))

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from twin._checks import InputError
+from twin._checks import InputError, is_concrete
 from twin.control.controller import AbstractSampledController
 from twin.control.preload import CascadeGains
 from twin.drives.rack_pinion import TorquePair
@@ -39,7 +39,8 @@ class SampledPreloadCascade(AbstractSampledController):
     differences of the encoder positions over one tick; the axis is taken to have moved evenly before the start.
 
     Raises:
-        InputError: fewer than one tick per tick of the position controller.
+        InputError: fewer than one tick per tick of the position controller; gains of preload and velocity controller
+            whose product is 1 or more, so that each tick would answer the one before by more than it corrects.
     """
 
     gains: CascadeGains
@@ -52,6 +53,14 @@ class SampledPreloadCascade(AbstractSampledController):
     def __check_init__(self):
         if self.position_every < 1:
             raise InputError(f"position_every must be at least 1, but is {self.position_every}. Give a whole number.")
+        product = getattr(self.gains, "preload_gain", None), getattr(self.gains, "velocity_gain", None)
+        if all(isinstance(gain, Array) and is_concrete(gain) and gain.ndim == 0 for gain in product):
+            loop = float(self.gains.preload_gain * self.gains.velocity_gain)
+            if loop >= 1:
+                raise InputError(
+                    f"preload_gain times velocity_gain is {loop:g}, but must stay below 1: the preload controller sees "
+                    "torques of the tick before, and would swing up. Lower the preload_gain."
+                )
 
     def initial_state(self, measurement: Any, period: Float[Array, ""]) -> SampledPreloadMemory:
         zero = jnp.zeros(())

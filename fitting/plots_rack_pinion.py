@@ -58,7 +58,7 @@ def plot_preload_responses(
     return grid
 
 
-def plain_ticks(ax: "Axes", places: Sequence[float]) -> None:
+def plain_ticks(ax: "Axes", places: Sequence[float | int]) -> None:
     """Plain numbers at some places of a logarithmic abscissa, which keeps its limits.
 
     Args:
@@ -66,9 +66,11 @@ def plain_ticks(ax: "Axes", places: Sequence[float]) -> None:
         places: where ticks are wanted; those outside of the limits are left out.
     """
     low, high = ax.get_xlim()
-    inside = [place for place in places if low <= place <= high]
+    # The limits of a logarithmic axis carry rounding.
+    inside = [place for place in places if low * (1 - 1e-9) <= place <= high * (1 + 1e-9)]
     ax.set_xticks(inside, [f"{place:g}" for place in inside])
     ax.set_xticks([], minor=True)
+    ax.set_xlim(low, high)
 
 
 def plot_load_surface(

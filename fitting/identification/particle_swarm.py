@@ -38,7 +38,7 @@ def particle_swarm(
     J. Kennedy 2002 (0.7298, 1.4962), which need no tuning.
 
     Args:
-        cost: costs of many positions at once.
+        cost: costs of many positions at once; one that is not a number counts as infinite.
         lower: lower bounds.
         upper: upper bounds.
         target: cost at which to stop.
@@ -52,10 +52,15 @@ def particle_swarm(
     low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
     if not (np.all(np.isfinite(low)) and np.all(np.isfinite(high)) and np.all(low < high)):
         raise InputError(f"A swarm needs finite bounds, lower below upper, but has {low} and {high}. Give such bounds.")
+
+    def costs(places: np.ndarray) -> np.ndarray:
+        values = np.asarray(cost(places), dtype=float)
+        return np.where(np.isnan(values), np.inf, values)
+
     random = np.random.default_rng(seed)
     place = random.uniform(low, high, (particles, low.size))
     speed = np.zeros_like(place)
-    best, best_cost = place.copy(), np.asarray(cost(place))
+    best, best_cost = place.copy(), costs(place)
     evaluations = particles
     for _ in range(rounds):
         leader = best[np.argmin(best_cost)]
@@ -66,7 +71,7 @@ def particle_swarm(
         moved = place + speed
         place = np.clip(moved, low, high)
         speed = np.where(moved == place, speed, 0.0)
-        new = np.asarray(cost(place))
+        new = costs(place)
         evaluations += particles
         better = new < best_cost
         best, best_cost = np.where(better[:, None], place, best), np.where(better, new, best_cost)

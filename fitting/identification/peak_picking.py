@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import ArrayLike, Complex, Float
 
-from twin._checks import InputError, positive
+from twin._checks import InputError, finite, increasing, positive
 
 ESTIMATORS = ("paper", "exact")
 # Lines on either side of the crossing through which the response is smoothed by a parabola.
@@ -43,8 +43,8 @@ def pick_peak(
 
         G = (d·s + k)/(m·s² + (d + d_f)·s + k)
 
-    is -90° beyond the natural frequency: there, with d_f = 0, m·ω₀² = k·(1 + 1/|G|²), so that k reads high by the
-    factor 1 + 4·D², 2.7 to 5.4 % for D = 0.08 to 0.11.
+    is -90° beyond the natural frequency: there, with d_f = 0, m·ω₀² = k·(1 + 1/|G|²), so that k and d read high by the
+    factor 1/(1 - 4·D²), 2.6 to 5.1 % for D = 0.08 to 0.11, and D by the root of it.
 
     "exact" solves this G for k and d at the same point: d + d_f = k/(ω₀·|G|) and k·(1 + 1/|G|²) = m·ω₀² +
     d_f·ω₀/|G|.
@@ -58,8 +58,8 @@ def pick_peak(
         band: where to look for the peak [Hz].
 
     Raises:
-        InputError: unknown estimator, a mass that is not positive, values that are not finite, or no -90° point in the
-            band.
+        InputError: unknown estimator, a mass that is not positive, values that are not finite, frequencies that do not
+            increase, or no -90° point in the band.
     """
     if estimator not in ESTIMATORS:
         raise InputError(f'estimator must be "paper" or "exact", but is {estimator!r}. Choose one of the two.')
@@ -67,6 +67,8 @@ def pick_peak(
     f, g = np.asarray(frequency, dtype=float), np.asarray(response)
     if f.ndim != 1 or f.shape != g.shape:
         raise InputError(f"frequency has shape {f.shape} and the response {g.shape}; give two vectors of one length.")
+    increasing("frequency", f, "Hz")
+    finite("guide_damping", guide_damping, "Ns/m")
     inside = (f >= band[0]) & (f <= band[1])
     f, g = f[inside], g[inside]
     if not np.all(np.isfinite(g)):

@@ -90,8 +90,11 @@ def identify_preload_chain(
         responses: responses of the sweeps where they are known already; estimated if not given.
 
     Raises:
-        InputError: no -90° point of a sweep that is to be fitted, too few sweeps left.
+        InputError: no -90° point of a sweep that is to be fitted, too few sweeps left, responses that are not one for
+            each sweep.
     """
+    if responses is not None and len(responses) != len(sweeps):
+        raise InputError(f"{len(sweeps)} sweeps and {len(responses)} responses were given. Give one response for each.")
     mass = float(drive.table_mass)
     found = []
     for i, sweep in enumerate(sweeps):

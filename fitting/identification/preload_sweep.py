@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from twin._checks import InputError
+from twin._checks import InputError, positive
 from twin.frf import FRF
 from twin.frf_estimators import estimate_frf
 from twin.record import Record
@@ -56,8 +56,9 @@ class PreloadSweep:
             sample_rate: rate of the result [Hz].
 
         Raises:
-            InputError: if the record's rate is no whole multiple of it.
+            InputError: if it is not positive, or the record's rate is no whole multiple of it.
         """
+        positive("sample_rate", sample_rate, "Hz")
         ratio = float(self.record.sample_rate) / sample_rate
         every = round(ratio)
         if every < 1 or abs(ratio - every) > 1e-3 * ratio:

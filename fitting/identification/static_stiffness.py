@@ -82,12 +82,14 @@ def identify_static_stiffness(
 
     Raises:
         InputError: another motor than 1 or 2, a missing channel, a record that stays on one side of the play, too few
-            samples above the least torque.
+            points, or too few of them above the least torque.
     """
     if motor not in (1, 2):
         raise InputError(f"motor must be 1 or 2, but is {motor}. Say which of the two motors drove.")
     positive("least_torque", least_torque, "Nm")
     positive("deviation", deviation, "m")
+    if points < 8:
+        raise InputError(f"points must be at least 8, but is {points}. Five parameters are fitted to them.")
     torque = np.asarray(record.channel(f"torque_{motor}"))
     apart = np.asarray(record.channel(f"position_{motor}") - record.channel("table_position"))
     size = max(1, torque.size // points)

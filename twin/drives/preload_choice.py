@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, ArrayLike, Float
 
-from twin._checks import InputError, as_scalar, is_concrete, positive
+from twin._checks import InputError, as_scalar, finite, is_concrete, not_negative, positive
 from twin.drives.rack_pinion import RackPinionDrive
 from twin.drives.rack_pinion_operation import mesh_forces, preloaded_torques
 
@@ -77,8 +77,9 @@ def preload_for_stiffness(
         reserve: force that is to stay on the flank of the motor that carries less [N].
 
     Raises:
-        InputError: a stiffness, torque, constant or resistance that is not positive; a stiffness that not even the
-            rated torque gives; a load that leaves no room for a preload.
+        InputError: a stiffness, torque, constant or resistance that is not positive; a load or velocity that is not
+            finite; a negative reserve; a stiffness that not even the rated torque gives; a load that leaves no room
+            for a preload.
     """
     for name, value, unit in (
         ("stiffness", stiffness, "N/m"),
@@ -87,6 +88,9 @@ def preload_for_stiffness(
         ("resistance", resistance, "Ohm"),
     ):
         positive(name, value, unit)
+    finite("load", load, "N")
+    finite("velocity", velocity, "m/s")
+    not_negative("reserve", reserve, "N")
     given = (drive, as_scalar(load), as_scalar(velocity))
     loss = as_scalar(resistance / torque_constant**2)
     least, most, best, choice = _choose(given, as_scalar(stiffness), as_scalar(rated_torque), as_scalar(reserve), loss)

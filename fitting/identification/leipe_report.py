@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
@@ -26,11 +25,12 @@ from fitting.identification.leipe import (
 )
 from fitting.identification.leipe_bench import PERIOD, bench_drive
 from fitting.identification.leipe_plots import draw_all
+from fitting.identification.leipe_reconstruction import reconstruct
 from fitting.identification.load_surface import LoadSurfaceFit
-from fitting.identification.particle_swarm import SwarmResult, particle_swarm
+from fitting.identification.particle_swarm import SwarmResult
 from fitting.identification.preload_direct import curve_errors, curve_intervals
+from fitting.identification.swarm_price import swarm_price
 from fitting.result import FitResult
-from twin.control import mesh_forces_of_motion, reconstruct_table_position
 from twin.drives import RackPinionDrive
 from twin.drives.rack_pinion_operation import table_response
 from twin.io.parameter_file import ParameterEntry, write_parameters
@@ -222,43 +222,11 @@ def _parameters(result: FitResult) -> dict[str, Any]:
 def swarms(sweeps: SweepStudy) -> dict[str, tuple[SwarmResult, int]]:
     """What a swarm pays for the errors of the chain's curve fits, next to what the gradient fits paid.
 
-    A gradient fit pays one evaluation for each residual and one more for each column of its Jacobian. The swarm stops
-    as soon as its error is as small but for a part in a million.
-
     Args:
         sweeps: of which the exact chain's points are used.
     """
-    used = [p for p in sweeps.exact.points if p.used and p.peak is not None]
-    forces = np.abs(np.asarray([p.forces for p in used])).T
-    found = {}
-    for name, fit, field in (
-        ("stiffness", sweeps.exact.stiffness, "stiffness"),
-        ("damping", sweeps.exact.damping, "damping"),
-    ):
-        measured = np.asarray([getattr(p.peak, field) for p in used])
-        law = _root if name == "stiffness" else _hyperbola
-        values = fit.result.values
-
-        def cost(places: np.ndarray, law: Any = law, measured: np.ndarray = measured) -> np.ndarray:
-            errors = np.sum(law(np.exp(places), forces), axis=1) - measured
-            return np.sqrt(np.sum(errors**2, axis=1) / np.sum(measured**2))  # eq. 5a
-
-        middle = np.log(values)
-        target = fit.error_percent / 100 * (1 + 1e-6)
-        swarm = particle_swarm(cost, middle - np.log(30.0), middle + np.log(30.0), target=target)
-        paid = (fit.result.steps + 1) * (len(values) + 1)
-        found[name] = (swarm, paid)
-    return found
-
-
-def _root(p: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Eq. 3 for many particles: (particles, 2, points)."""
-    return p[:, 0, None, None] * np.sqrt(forces**2 + 1.0) ** (1 / p[:, 1, None, None])
-
-
-def _hyperbola(p: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Eq. 8 for many particles: (particles, 2, points)."""
-    return p[:, 0, None, None] / (p[:, 1, None, None] + np.sqrt(forces**2 + 1.0)) + p[:, 2, None, None]
+    forces, totals = sweeps.exact.fitted_totals()
+    return {name: swarm_price(getattr(sweeps.exact, name), forces, totals[name]) for name in totals}
 
 
 def _swarm(sweeps: SweepStudy) -> dict[str, Any]:
@@ -274,42 +242,11 @@ def _swarm(sweeps: SweepStudy) -> dict[str, Any]:
 
 
 def _reconstruction(direct: DirectStudy, validation: Validation) -> dict[str, dict[str, float]]:
-    """Rms errors of the table position made from motor encoders [µm], at 10 % and, with loss of preload, at 6 %."""
-    drive = validation.drive
-    zeros = direct.fits.joint.model
-    found = {}
-    for name, measurement, reference in (
-        ("10 % preload", validation.measurement, validation.reference),
-        ("6 % preload", direct.moves[0], direct.move),
-    ):
-        record = measurement.record
-        motion = reference_motion(reference, record.times)
-        torques = jnp.stack([record.channel("torque_1"), record.channel("torque_2")])
-        forces = mesh_forces_of_motion(drive, torques, *motion)
-        positions = jnp.stack(
-            [record.channel("position_1") - zeros.zero_1, record.channel("position_2") - zeros.zero_2]
-        )
-        moving = slice(round(0.4 / PERIOD), None)
-        table = np.asarray(record.channel("table_position"))[moving]
-        estimates = {
-            "mean of the motors": jnp.mean(positions, axis=0),
-            "motor 1": positions[0],
-            "reconstructed": reconstruct_table_position(drive, positions, forces),
-        }
-        errors = {key: np.asarray(value)[moving] - table for key, value in estimates.items()}
-        found[name] = {key: 1e6 * float(np.sqrt(np.mean(error**2))) for key, error in errors.items()}
-    return found
-
-
-def reference_motion(reference: Any, times: Any) -> tuple[Any, Any]:
-    """Set velocity and acceleration at some times.
-
-    Args:
-        reference: the motion.
-        times: times [s].
-    """
-    points = jax.vmap(reference)(jnp.asarray(times))
-    return points.velocity, points.acceleration
+    """Rms errors of the table position made from motor encoders [µm]."""
+    return {
+        name: {key: 1e6 * float(np.sqrt(np.mean(error**2))) for key, error in found.errors.items()}
+        for name, found in reconstruct(direct, validation).items()
+    }
 
 
 def _choices(validation: Validation) -> list[dict[str, float]]:

@@ -1,5 +1,6 @@
 """The pictures of the reproduction of Leipe et al."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import jax
@@ -15,8 +16,11 @@ from fitting.identification.leipe import (
     choose_preloads,
 )
 from fitting.identification.leipe_bench import bench_drive
+from fitting.identification.leipe_reconstruction import Reconstruction, reconstruct
 from fitting.plots import plot_comparison, save_figure
+from fitting.plots_axes import grid_or_new
 from fitting.plots_rack_pinion import plain_ticks, plot_load_surface, plot_preload_responses, plot_quadrants
+from twin.drives import RackPinionDrive
 
 
 def draw_all(out: Path, curves: CurveFits, sweeps: SweepStudy, direct: DirectStudy, validation: Validation) -> None:
@@ -32,24 +36,29 @@ def draw_all(out: Path, curves: CurveFits, sweeps: SweepStudy, direct: DirectStu
     save_figure(plot_preload_responses(sweeps.exact.points)[0].figure, out / "fig4_responses.png")
     quadrants = plot_quadrants(bench_drive().train_1.mesh.stiffness, direct.moves[0].forces)
     save_figure(quadrants.figure, out / "fig5_quadrants.png")
-    used = [p for p in sweeps.exact.points if p.used and p.peak is not None]
-    forces = np.asarray([p.forces for p in used]).T
-    for figure, fit, field, unit, scale in (
-        ("fig6_stiffness", sweeps.exact.stiffness, "stiffness", "N/µm", 1e6),
-        ("fig7_damping", sweeps.exact.damping, "damping", "kNs/m", 1e3),
+    forces, totals = sweeps.exact.fitted_totals()
+    for figure, name, unit, scale in (
+        ("fig6_stiffness", "stiffness", "N/µm", 1e6),
+        ("fig7_damping", "damping", "kNs/m", 1e3),
     ):
-        totals = np.asarray([getattr(p.peak, field) for p in used])
-        surface = plot_load_surface(fit, forces, totals, label=f"total {field} [{unit}]", scale=scale)
+        found = getattr(sweeps.exact, name)
+        surface = plot_load_surface(found, forces, totals[name], label=f"total {name} [{unit}]", scale=scale)
         save_figure(surface.figure, out / f"{figure}.png")
-    _draw_validation(out / "fig8_validation.png", validation)
-    _draw_curves(out / "curves.png", sweeps, direct)
-    _draw_preloads(out / "preload_choice.png", validation)
+    save_figure(plot_validation(validation)[0].figure, out / "fig8_validation.png")
+    save_figure(plot_curve_errors(sweeps, direct)[0].figure, out / "curves.png")
+    save_figure(plot_preload_choice(validation.drive)[0].figure, out / "preload_choice.png")
+    save_figure(plot_reconstruction(reconstruct(direct, validation))[0].figure, out / "reconstruction.png")
 
 
-def _draw_validation(path: Path, validation: Validation) -> None:
+def plot_validation(validation: Validation) -> "np.ndarray":
+    """Set position and both torques of the validation move, measured and simulated (Leipe et al., fig. 8).
+
+    Args:
+        validation: the validation move.
+    """
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(3, 1, figsize=(7.0, 6.4), layout="constrained", sharex=True)
+    _, axes = pyplot.subplots(3, 1, figsize=(7.0, 6.4), layout="constrained", sharex=True)
     record = validation.measurement.record
     motion = jax.vmap(validation.reference)(record.times)
     axes[0].plot(record.times, motion.position, color="C2")
@@ -67,14 +76,19 @@ def _draw_validation(path: Path, validation: Validation) -> None:
         error = validation.mean_absolute_errors[i - 1]
         ax.set_title(f"mean absolute error {error:.3f} Nm", fontsize="medium", loc="left")
     axes[1].set_xlabel("")
-    save_figure(figure, path)
+    return axes
 
 
-def _draw_curves(path: Path, sweeps: SweepStudy, direct: DirectStudy) -> None:
-    """k(F) and d(F) of one drive train from every procedure, as errors against the truth."""
+def plot_curve_errors(sweeps: SweepStudy, direct: DirectStudy) -> "np.ndarray":
+    """k(F) and d(F) of one drive train from every procedure, as errors against the truth.
+
+    Args:
+        sweeps: sweeps and chain.
+        direct: direct fits.
+    """
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(2, 1, figsize=(7.0, 5.4), layout="constrained", sharex=True)
+    _, axes = pyplot.subplots(2, 1, figsize=(7.0, 5.4), layout="constrained", sharex=True)
     force = np.geomspace(250.0, 5000.0, 80)
     truth = bench_drive().train_1.mesh
     found = {
@@ -99,17 +113,21 @@ def _draw_curves(path: Path, sweeps: SweepStudy, direct: DirectStudy) -> None:
     axes[0].legend(fontsize="small", ncols=2)
     plain_ticks(axes[1], [250, 500, 1000, 2000, 5000])
     axes[1].set_xlabel("force through the mesh [N]")
-    save_figure(figure, path)
+    return axes
 
 
-def _draw_preloads(path: Path, validation: Validation) -> None:
-    """The preload that a stiffness needs, and its copper loss, over the process force."""
+def plot_preload_choice(drive: RackPinionDrive) -> "np.ndarray":
+    """The preload that a stiffness needs, and its copper loss, over the process force.
+
+    Args:
+        drive: the drive.
+    """
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(1, 2, figsize=(8.4, 3.4), layout="constrained")
+    _, axes = pyplot.subplots(1, 2, figsize=(8.4, 3.4), layout="constrained")
     loads = np.linspace(-2500.0, 2500.0, 21)
     for wanted in (1.1e8, 1.3e8, 1.5e8):
-        chosen = choose_preloads(validation.drive, wanted, loads.tolist())
+        chosen = choose_preloads(drive, wanted, loads.tolist())
         label = f"{wanted / 1e6:g} N/µm"
         axes[0].plot(loads / 1e3, [100 * float(c.preload) / RATED_TORQUE for c in chosen], label=label)
         axes[1].plot(loads / 1e3, [float(c.extra_loss) for c in chosen], label=label)
@@ -119,4 +137,23 @@ def _draw_preloads(path: Path, validation: Validation) -> None:
         ax.set_xlabel("process force [kN]")
         ax.margins(x=0)
     axes[0].legend(title="total stiffness", fontsize="small")
-    save_figure(figure, path)
+    return axes
+
+
+def plot_reconstruction(found: Mapping[str, Reconstruction]) -> "np.ndarray":
+    """Errors of the table position made from the motor encoders, over time.
+
+    Args:
+        found: reconstructions by name.
+    """
+    grid = grid_or_new(None, len(found), columns=1, panel=(7.0, 2.4))
+    for ax, (name, one) in zip(grid, found.items(), strict=True):
+        for i, (label, error) in enumerate(one.errors.items()):
+            ax.plot(one.times, 1e6 * error, color=f"C{i}", lw=1.0, label=label)
+        ax.axhline(0.0, color="0.4", lw=0.8, zorder=0)
+        ax.set_title(name, fontsize="medium", loc="left")
+        ax.set_ylabel("error of x_T [µm]")
+        ax.margins(x=0)
+    grid[0].legend(fontsize="small", ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    grid[-1].set_xlabel("time [s]")
+    return grid

@@ -3,7 +3,6 @@
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
@@ -18,11 +17,11 @@ from fitting.identification.leipe import (
     choose_preloads,
 )
 from fitting.identification.leipe_bench import PERIOD, bench_drive
-from fitting.identification.leipe_swarm import swarms
+from fitting.identification.leipe_reconstruction import reconstruct
 from fitting.identification.load_surface import LoadSurfaceFit
 from fitting.identification.preload_direct import curve_errors, curve_intervals
+from fitting.identification.swarm_price import swarm_price
 from fitting.result import FitResult
-from twin.control import mesh_forces_of_motion, reconstruct_table_position
 from twin.drives import RackPinionDrive
 from twin.drives.rack_pinion_operation import table_response
 
@@ -142,7 +141,8 @@ def _parameters(result: FitResult) -> dict[str, Any]:
 
 
 def _swarm(sweeps: SweepStudy) -> dict[str, Any]:
-    found = swarms(sweeps)
+    forces, totals = sweeps.exact.fitted_totals()
+    found = {name: swarm_price(getattr(sweeps.exact, name), forces, totals[name]) for name in totals}
     return {
         "evaluations": sum(swarm.evaluations for swarm, _ in found.values()),
         "gradient_evaluations": sum(paid for _, paid in found.values()),
@@ -154,42 +154,11 @@ def _swarm(sweeps: SweepStudy) -> dict[str, Any]:
 
 
 def _reconstruction(direct: DirectStudy, validation: Validation) -> dict[str, dict[str, float]]:
-    """Rms errors of the table position made from motor encoders [µm], at 10 % and, with loss of preload, at 6 %."""
-    drive = validation.drive
-    zeros = direct.fits.joint.model
-    found = {}
-    for name, measurement, reference in (
-        ("10 % preload", validation.measurement, validation.reference),
-        ("6 % preload", direct.moves[0], direct.move),
-    ):
-        record = measurement.record
-        motion = reference_motion(reference, record.times)
-        torques = jnp.stack([record.channel("torque_1"), record.channel("torque_2")])
-        forces = mesh_forces_of_motion(drive, torques, *motion)
-        positions = jnp.stack(
-            [record.channel("position_1") - zeros.zero_1, record.channel("position_2") - zeros.zero_2]
-        )
-        moving = slice(round(0.4 / PERIOD), None)
-        table = np.asarray(record.channel("table_position"))[moving]
-        estimates = {
-            "mean of the motors": jnp.mean(positions, axis=0),
-            "motor 1": positions[0],
-            "reconstructed": reconstruct_table_position(drive, positions, forces),
-        }
-        errors = {key: np.asarray(value)[moving] - table for key, value in estimates.items()}
-        found[name] = {key: 1e6 * float(np.sqrt(np.mean(error**2))) for key, error in errors.items()}
-    return found
-
-
-def reference_motion(reference: Any, times: Any) -> tuple[Any, Any]:
-    """Set velocity and acceleration at some times.
-
-    Args:
-        reference: the motion.
-        times: times [s].
-    """
-    points = jax.vmap(reference)(jnp.asarray(times))
-    return points.velocity, points.acceleration
+    """Rms errors of the table position made from motor encoders [µm]."""
+    return {
+        name: {key: 1e6 * float(np.sqrt(np.mean(error**2))) for key, error in found.errors.items()}
+        for name, found in reconstruct(direct, validation).items()
+    }
 
 
 def _choices(validation: Validation) -> list[dict[str, float]]:

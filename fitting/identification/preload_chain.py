@@ -44,6 +44,13 @@ class PreloadChain:
     damping: LoadSurfaceFit
     """d(F), eq. 7 to 10."""
 
+    def fitted_totals(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Motor forces (2, points) [N] and the totals at them, by the name of the law that is fitted to them."""
+        used = [point for point in self.points if point.used and point.peak is not None]
+        forces = np.asarray([point.forces for point in used]).T
+        totals = {name: np.asarray([getattr(point.peak, name) for point in used]) for name in ("stiffness", "damping")}
+        return forces, totals
+
     def to_dataframe(self) -> pd.DataFrame:
         """One row for each sweep: preload, forces, natural frequency, magnitude, stiffness, damping."""
         rows = []

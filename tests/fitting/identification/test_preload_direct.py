@@ -4,22 +4,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from driven_table_records import DRIVE, TRUTH, UNITS, ZEROS, noisy, record
+from driven_table_records import DRIVE, TRUTH, UNITS, ZEROS, record
 
-from fitting.fit import fit
 from fitting.identification.preload_direct import (
     curve_errors,
-    curve_intervals,
     cut,
     fit_direct,
-    mesh_space,
     motion_space,
     response_evidence,
     with_laws,
     with_zeros,
 )
 from fitting.identification.preload_sweep import PreloadSweep
-from fitting.residuals.driven_table import DrivenTableResidual
 from fitting.residuals.preloaded_response import PreloadedResponseResidual
 from twin._checks import InputError
 from twin.drives import DrivenTable
@@ -41,11 +37,6 @@ def evidence():
     parts = np.random.default_rng(3).standard_normal((2, *values.shape))
     noise = np.sqrt(variance / 2) * (parts[0] + 1j * parts[1])
     return PreloadedResponseResidual(FREQUENCY, jnp.asarray(values + noise), variance, FORCES, 0.005)
-
-
-@pytest.fixture(scope="module")
-def result():
-    return fit(evidence(), DrivenTable(START), mesh_space(), variance="known")
 
 
 def test_free_parameters_are_tied_in_both_drive_trains():
@@ -119,46 +110,6 @@ def test_curve_errors():
     np.testing.assert_allclose(damping, 0.0, atol=1e-15)
 
 
-@pytest.mark.slow
-def test_curve_intervals_agree_with_sampling(result):
-    """Draws from a covariance so small that the curves are straight over it."""
-    found = curve_intervals(result, POINTS)
-    draws = np.random.default_rng(5).multivariate_normal(result.scaled, 1e-6 * result.scaled_covariance, 4000)
-
-    def curves(scaled):
-        mesh = mesh_space().unpack(result.model, scaled).drive.train_1.mesh
-        return jnp.stack([mesh.stiffness(POINTS), mesh.damping(POINTS)])
-
-    logs = np.log(np.asarray(jax.jit(jax.vmap(curves))(jnp.asarray(draws))))
-    expected = 196e3 * np.max(np.std(logs, axis=0), axis=1)
-    assert found["stiffness"] == pytest.approx(expected[0], rel=0.08)
-    assert found["damping"] == pytest.approx(expected[1], rel=0.08)
-    errors = curve_errors(result.model.drive, DRIVE, POINTS)
-    assert 100 * np.max(np.abs(errors[0])) < 1.5 * found["stiffness"]
-    assert 100 * np.max(np.abs(errors[1])) < 1.5 * found["damping"]
-
-
 def test_a_direct_fit_needs_motions():
     with pytest.raises(InputError, match="no motion to fit to"):
         fit_direct(evidence(), {}, DrivenTable(START), motion_space(play=False))
-
-
-@pytest.mark.slow
-def test_the_truth_lies_within_the_intervals_of_a_direct_fit():
-    records = [noisy(record(p), 2e-8, seed) for seed, p in enumerate((12.0, 30.0, 90.0))]
-    r = float(DRIVE.travel_per_radian)
-    motions = DrivenTableResidual.create(records, r, position_deviation=1e-8, force_deviation=5.0, settling_time=0.08)
-    space, start = motion_space(play=False), DrivenTable(START, *ZEROS)
-    found = fit_direct(evidence(), {"short": motions}, start, space)
-    for one in (found.frf, found.time, found.joint):
-        assert one.success
-    laws = mesh_space().paths
-    for one, paths in ((found.frf, laws), (found.joint, space.paths)):
-        intervals = dict(zip(space.paths, one.intervals(0.999), strict=True))
-        for path in paths:
-            truth = float(space.values(TRUTH)[space.paths.index(path)])
-            assert intervals[path][0] < truth < intervals[path][1], path
-    joint, frf = curve_intervals(found.joint, POINTS), curve_intervals(found.frf, POINTS)
-    for name in ("stiffness", "damping"):
-        assert joint[name] < 1.02 * frf[name]
-        assert joint[name] < 1.02 * curve_intervals(found.time, POINTS)[name]

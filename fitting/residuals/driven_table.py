@@ -85,8 +85,8 @@ class DrivenTableResidual(AbstractResidual):
             settling_time: part of each record that is not compared [s].
 
         Raises:
-            InputError: no record, records of different lengths, a missing channel, a deviation that is not positive,
-                a settling time as long as the records.
+            InputError: no record, records of different lengths or sample times, a missing channel, a deviation that is
+                not positive, a settling time as long as the records.
         """
         positive("position_deviation", position_deviation, "m")
         positive("force_deviation", force_deviation, "N")
@@ -96,6 +96,12 @@ class DrivenTableResidual(AbstractResidual):
         if len(lengths) > 1:
             raise InputError(f"Records have different lengths ({sorted(lengths)} samples). Cut them to the shortest.")
         times = np.asarray(records[0].times) - float(records[0].times[0])
+        for record in records:
+            own = np.asarray(record.times) - float(record.times[0])
+            if not np.allclose(own, times, rtol=0.0, atol=1e-3 * float(records[0].sample_period)):
+                raise InputError(
+                    f"{record.name} is sampled at other times than {records[0].name}. Give one sample period."
+                )
         settled = int(np.searchsorted(times, settling_time))
         if settled >= times.size:
             raise InputError(f"settling_time of {settling_time:g} s is as long as the records. Take a shorter one.")

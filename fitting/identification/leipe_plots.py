@@ -154,6 +154,6 @@ def plot_reconstruction(found: Mapping[str, Reconstruction]) -> "np.ndarray":
         ax.set_title(name, fontsize="medium", loc="left")
         ax.set_ylabel("error of x_T [µm]")
         ax.margins(x=0)
-    grid[0].legend(fontsize="small", ncols=len(one.errors), loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    grid[0].legend(fontsize="small", ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     grid[-1].set_xlabel("time [s]")
     return grid

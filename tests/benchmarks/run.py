@@ -13,7 +13,7 @@ import jax
 
 from twin._loop_option import make_small_loops_one_function
 
-SECTIONS = ("simulation", "programmes", "multistart", "swarm")
+SECTIONS = ("simulation", "rack_pinion", "programmes", "multistart", "swarm")
 
 
 def main() -> None:
@@ -31,7 +31,7 @@ def main() -> None:
     make_small_loops_one_function()
     jax.config.update("jax_enable_x64", True)
     # Imported late: these modules make arrays.
-    from tests.benchmarks import multistart, programmes, swarm
+    from tests.benchmarks import multistart, programmes, rack_pinion, rack_report, swarm
     from tests.benchmarks.emps_case import dahl_case, rigid_case
     from tests.benchmarks.emps_simulation import compare, compare_best
     from tests.benchmarks.report import as_dictionary, as_markdown, machine
@@ -45,10 +45,14 @@ def main() -> None:
         if not options.short:
             comparisons.insert(0, compare_best(rigid, stretch, rounds=options.rounds))
         results["emps_simulation"] = [as_dictionary(c) for c in comparisons]
+    if "rack_pinion" in options.sections:
+        drives = rack_pinion.all_rows(options.rounds)
+        text += rack_report.as_markdown(drives) + "\n"
+        results["rack_pinion"] = rack_report.as_dictionary(drives)
     if "programmes" in options.sections:
         found = programmes.counts()
         speeds = programmes.throughputs(options.starts, options.rounds)
-        text = programmes.as_markdown(found, speeds) + "\n"
+        text += programmes.as_markdown(found, speeds) + "\n"
         results["nonlinear_programmes"] = programmes.as_dictionary(found, speeds)
 
     if "multistart" in options.sections:

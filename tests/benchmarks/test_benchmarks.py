@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from types import SimpleNamespace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -12,6 +13,8 @@ pytest.importorskip("casadi", reason="CasADi, a peer of the benchmarks, is not i
 
 from tests.benchmarks.emps_case import Case, dahl_case, rigid_case
 from tests.benchmarks.emps_simulation import CVODES, SCIPY, TWIN, Comparison, compare
+from tests.benchmarks.rack_case import STATES, closed_loop, constants, move, rate, segments, space, variants
+from tests.benchmarks.rack_loop import compiled_loop
 
 pytestmark = pytest.mark.slow
 
@@ -57,3 +60,38 @@ def test_the_peers_get_the_equations_of_the_twin(make: Callable[[], Case]):
     functions = SimpleNamespace(sqrt=np.sqrt, expm1=np.expm1, exp=np.exp)
     theirs = case.rate(list(state), 1.7, case.values(case.vector, functions), functions)
     np.testing.assert_allclose(ours, theirs, rtol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def rack_states() -> list[tuple[Any, ...]]:
+    """Time, reference, state and parameters, at random; the state is about as large as it gets."""
+    random = np.random.default_rng(3)
+    size = np.array([1e-2, 1e-2, 2e-5, 1.0, 1.0, 1e-2, 1.0, 1.0])
+    cases = []
+    for values, t in zip(variants(20, seed=4), random.uniform(0.0, 3.0, 20), strict=True):
+        wanted = next(s for s in segments() if t <= s.end).point(t)
+        cases.append((t, wanted, size * random.standard_normal(STATES), values))
+    return cases
+
+
+def test_the_rack_and_pinion_peers_get_the_equations_of_the_twin(rack_states: list[tuple[Any, ...]]):
+    loop, reference = closed_loop(), move()
+    structure = jax.tree.structure(loop.initial_state())
+
+    @jax.jit
+    def ours(t, state, values):
+        named = jax.tree.unflatten(structure, list(state))
+        return jnp.stack(jax.tree.leaves(space().unpack(loop, values).vector_field(t, named, reference(t))))
+
+    for t, wanted, state, values in rack_states:
+        theirs = rate(state.tolist(), wanted, constants(values.tolist()), np.sqrt)
+        np.testing.assert_allclose(ours(t, state, values), theirs, rtol=1e-10, atol=1e-10)
+
+
+def test_the_c_loop_gets_the_same_equations(rack_states: list[tuple[Any, ...]]):
+    loop = compiled_loop()
+    if loop is None:
+        pytest.skip("no C compiler (cc, gcc or clang) was found")
+    for _, wanted, state, values in rack_states:
+        theirs = rate(state.tolist(), wanted, constants(values.tolist()), np.sqrt)
+        np.testing.assert_allclose(loop.rate(state, np.asarray(wanted), values), theirs, rtol=1e-10, atol=1e-10)

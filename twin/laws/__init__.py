@@ -22,6 +22,7 @@ from twin.laws.position_force import HarmonicForce as HarmonicForce
 from twin.laws.position_force import NoForce as NoForce
 from twin.laws.position_force import PolynomialForce as PolynomialForce
 from twin.laws.position_force import SumForce as SumForce
+from twin.laws.smooth import positive_power as positive_power
 from twin.laws.smooth import smooth_abs as smooth_abs
 from twin.laws.smooth import smooth_clip as smooth_clip
 from twin.laws.smooth import smooth_power as smooth_power

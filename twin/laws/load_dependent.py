@@ -6,7 +6,7 @@ import equinox as eqx
 from jaxtyping import Array, ArrayLike, Float
 
 from twin._checks import as_scalar, not_negative, positive
-from twin.laws.smooth import smooth_abs
+from twin.laws.smooth import positive_power, smooth_abs
 
 
 class AbstractLoadLaw(eqx.Module):
@@ -45,7 +45,7 @@ class RootStiffness(AbstractLoadLaw):
         positive("width", self.width, "N")
 
     def __call__(self, force: Float[ArrayLike, "*batch"]) -> Float[Array, "*batch"]:
-        return self.k1 * smooth_abs(force, self.width) ** (1 / self.k2)  # eq. 3
+        return self.k1 * positive_power(smooth_abs(force, self.width), 1 / self.k2)  # eq. 3
 
 
 class HyperbolicDamping(AbstractLoadLaw):

@@ -13,7 +13,7 @@ from jaxtyping import Array, ArrayLike, Float
 from twin._checks import InputError, is_concrete
 from twin.laws.backlash import Backlash
 from twin.laws.load_dependent import AbstractLoadLaw, RootStiffness
-from twin.laws.smooth import smooth_abs, smooth_sign
+from twin.laws.smooth import positive_power, smooth_abs, smooth_sign
 
 # Newton's steps are compared with the deflection itself, which is where they start from.
 _ACCURACY = 1e-12
@@ -117,7 +117,7 @@ class TangentMesh(AbstractMesh):
     def _elastic(self, deflection: ArrayLike) -> tuple[Array, Array]:
         scale, power, width = self._law()
         indentation, contact = self.backlash(deflection), self.backlash.contact(deflection)
-        return contact * scale * smooth_abs(indentation, width) ** (power - 1) * indentation, contact
+        return contact * scale * positive_power(smooth_abs(indentation, width), power - 1) * indentation, contact
 
     def _law(self) -> tuple[Array, Array, Array]:
         """F = scale·|ε|^power, with |ε| smoothed so that the slope at ε = 0 is the stiffness at F = 0."""

@@ -61,6 +61,22 @@ def smooth_power(
     return smooth_sign(value, width) ** 2 * smooth_abs(value, width) ** exponent
 
 
+def positive_power(base: Float[ArrayLike, "*batch"], exponent: Float[ArrayLike, ""]) -> Float[Array, "*batch"]:
+    """Power of a positive number, x^p as exp(p·ln x).
+
+    The compiler calls a library for every single power, but writes out exponentials over whole vectors: in a batch this
+    is nearly twice as fast, and as accurate as p·ln x, to a few units in the last place for moderate powers.
+
+    Args:
+        base: x, positive, any shape, any unit.
+        exponent: p of any sign [-].
+
+    Returns:
+        The power in the shape of x.
+    """
+    return jnp.exp(exponent * jnp.log(base))
+
+
 def smooth_clip(
     value: Float[ArrayLike, "*batch"], limit: Float[ArrayLike, ""], width: Float[ArrayLike, ""]
 ) -> Float[Array, "*batch"]:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from twin.laws import smooth_abs, smooth_power, smooth_sign
+from twin.laws import positive_power, smooth_abs, smooth_power, smooth_sign
 
 
 def _half_power(value, width):
@@ -72,3 +72,12 @@ def test_sign_times_magnitude_is_the_value(value, width):
 def test_power_increases_with_magnitude(exponent):
     values = jnp.linspace(0.0, 10.0, 200)
     assert np.all(np.diff(smooth_power(values, 1.0, exponent)) > 0)
+
+
+@pytest.mark.parametrize("exponent", [-1.7, 0.0, 0.17, 1.0, 2.3])
+@pytest.mark.parametrize("base", [1e-12, 0.3, 1.0, 4.7e9])
+def test_positive_power_is_the_power_with_both_derivatives(base: float, exponent: float):
+    np.testing.assert_allclose(positive_power(jnp.asarray(base), exponent), base**exponent, rtol=2e-14)
+    by_base, by_exponent = jax.grad(positive_power, argnums=(0, 1))(jnp.asarray(base), jnp.asarray(exponent))
+    np.testing.assert_allclose(by_base, exponent * base ** (exponent - 1), rtol=1e-13)
+    np.testing.assert_allclose(by_exponent, np.log(base) * base**exponent, rtol=1e-13)

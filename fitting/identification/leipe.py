@@ -23,7 +23,8 @@ from fitting.identification.leipe_bench import (
     measure_against_stop,
     sweep_reference,
 )
-from fitting.identification.load_surface import LoadSurfaceFit, fit_hyperbolic_damping, fit_root_stiffness
+from fitting.identification.leipe_curves import CurveFits as CurveFits
+from fitting.identification.leipe_curves import fit_printed_curves as fit_printed_curves
 from fitting.identification.preload_chain import PreloadChain, identify_preload_chain
 from fitting.identification.preload_direct import (
     DirectFits,
@@ -37,14 +38,11 @@ from fitting.identification.preload_direct import (
 from fitting.identification.preload_sweep import PreloadSweep
 from fitting.identification.static_stiffness import identify_static_stiffness
 from fitting.residuals.driven_table import DrivenTableResidual
-from fitting.residuals.load_surface import total_over_contacts
 from fitting.residuals.trajectory import TrajectoryResidual
 from fitting.result import FitResult
 from twin.control import SampledLoop
 from twin.drives import DrivenTable, RackPinionDrive, leipe_drive
-from twin.drives.leipe import DAMPING, STIFFNESS
 from twin.drives.preload_choice import PreloadChoice, preload_for_stiffness
-from twin.laws import HyperbolicDamping, RootStiffness
 from twin.parameters import Parameter, ParameterSpace
 from twin.references import AbstractReference, JerkLimitedMove
 from twin.simulation import simulate
@@ -63,44 +61,6 @@ _MOTION_PRELOADS = (8.0, 20.0, 50.0, 100.0)
 _MOTION_PART = (SWEEP_START + 6.0, SWEEP_START + 12.0)
 _MOVE_TIME = 3.2
 _MOVE_START = 0.5
-
-
-@dataclasses.dataclass(frozen=True)
-class CurveFits:
-    """The laws fitted to totals made from the published ones (eq. 6, 10)."""
-
-    clean: tuple[LoadSurfaceFit, LoadSurfaceFit]
-    """Stiffness and damping from points as they are."""
-    scattered: tuple[LoadSurfaceFit, LoadSurfaceFit]
-    """From points with a scatter of 4 % rms."""
-    forces: np.ndarray
-    """Motor forces of the points (2, points) [N]."""
-    totals: tuple[np.ndarray, np.ndarray]
-    """Stiffnesses and dampings of the scattered points [N/m, Ns/m]."""
-
-
-def fit_printed_curves(scatter: float = 0.04, seed: int = 1) -> CurveFits:
-    """The curve fits of section V to points from the printed laws, without and with scatter.
-
-    Args:
-        scatter: rms of the scatter relative to the rms of the totals.
-        seed: of the scatter.
-    """
-    drive = leipe_drive()
-    preload = RATED_TORQUE * np.linspace(0.08, 1.0, 24)
-    # Near the angle bisector: what moves the table adds to one force and takes from the other.
-    forces = np.asarray(drive.motor_force(np.stack([preload + 0.3, preload - 0.3])))
-    random = np.random.default_rng(seed)
-    clean, scattered, totals = [], [], []
-    laws = (RootStiffness(*STIFFNESS), HyperbolicDamping(*DAMPING))
-    for law, identify in zip(laws, (fit_root_stiffness, fit_hyperbolic_damping), strict=True):
-        total = np.asarray(total_over_contacts(law, forces))
-        noise = random.standard_normal(total.size)
-        measured = total + scatter * noise * np.linalg.norm(total) / np.linalg.norm(noise)
-        clean.append(identify(forces, total))
-        scattered.append(identify(forces, measured))
-        totals.append(measured)
-    return CurveFits((clean[0], clean[1]), (scattered[0], scattered[1]), forces, (totals[0], totals[1]))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -208,7 +168,9 @@ class Validation:
     simulated: Trajectory
     """What the identified drive does."""
     mean_absolute_errors: tuple[float, float]
-    """J_τ of both motors [Nm]."""
+    """J_τ of both motors over the whole record [Nm]."""
+    errors_while_moving: tuple[float, float]
+    """The same from the start to the end of the move, without standstill [Nm]."""
 
 
 def validate(direct: DirectStudy, *, seed: int = 3) -> Validation:
@@ -223,16 +185,21 @@ def validate(direct: DirectStudy, *, seed: int = 3) -> Validation:
         direct.moves[last].record, direct.move, {"torque_1": 0.05, "torque_2": 0.05}, stepping=STEPPING
     )
     start = twin_loop(direct.fits.joint.model.drive, direct.move_preloads[last])
-    motors = fit(evidence, start, motor_space())
+    space = motor_space()
+    # A round inertia, hardly any friction.
+    start = space.with_values(start, jnp.asarray([5e-3, 0.05, 1e-3]))
+    motors = fit(evidence, start, space)
     drive = motors.model.plant.plant
     reference = JerkLimitedMove(1.0, 0.5, 1.0, 20.0, start_time=_MOVE_START)
     (measurement,) = measure([10.0], reference, _MOVE_TIME, seed=seed)
     simulated = follow(twin_loop(drive, 10.0), reference, measurement.record.times)
-    errors = [
-        float(jnp.mean(jnp.abs(simulated.channel(name) - measurement.record.channel(name))))
-        for name in ("torque_1", "torque_2")
-    ]
-    return Validation(motors, drive, reference, measurement, simulated, (errors[0], errors[1]))
+    times = np.asarray(measurement.record.times) - _MOVE_START
+    moving = (times >= 0) & (times <= float(reference.duration()))
+    errors = np.asarray(
+        [np.abs(simulated.channel(name) - measurement.record.channel(name)) for name in ("torque_1", "torque_2")]
+    )
+    whole, part = errors.mean(axis=1).tolist(), errors[:, moving].mean(axis=1).tolist()
+    return Validation(motors, drive, reference, measurement, simulated, tuple(whole), tuple(part))
 
 
 def twin_loop(drive: RackPinionDrive, preload_percent: float) -> SampledLoop:

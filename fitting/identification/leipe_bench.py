@@ -1,7 +1,10 @@
 """A stand-in for the bench of Leipe et al.: a simulated drive that is richer than any model fitted to its records.
 
 It has what a model will not know: friction that rises towards standstill, cogging, encoders of finite resolution, a
-controller that answers one tick late, current loops, noise. Stiffness and damping are the published ones (eq. 6, 10).
+controller that answers one tick late, current loops, noise on the torques. Stiffness and damping are the published ones
+(eq. 6, 10). What it shares with the model: the form of both laws and of the backlash, equal drive trains, the mass of
+the table, the settings of the controllers, and encoders that start at zero. So the figures say what the procedures
+lose, not what a machine that differs in these would add.
 """
 
 import dataclasses

@@ -73,7 +73,10 @@ def tabulate(summary: dict[str, Any]) -> str:
         f"(paper, on its own bench: {paper[0]:.3f} and {paper[1]:.3f} Nm)"
     )
     swarm = summary["swarm"]
-    lines.append(f"Curve fits: {swarm['gradient_evaluations']} evaluations, a swarm needs {swarm['evaluations']}")
+    reached = all(swarm[law]["swarm_reached"] for law in ("stiffness", "damping"))
+    more = "" if reached else "more than "
+    paid, needed = swarm["gradient_evaluations"], swarm["evaluations"]
+    lines.append(f"Curve fits: {paid} evaluations by gradients; a swarm needs {more}{needed}")
     return "\n".join(lines)
 
 

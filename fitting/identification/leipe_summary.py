@@ -21,6 +21,7 @@ from fitting.identification.leipe_reconstruction import reconstruct
 from fitting.identification.load_surface import LoadSurfaceFit
 from fitting.identification.preload_direct import curve_errors, curve_intervals
 from fitting.identification.swarm_price import swarm_price
+from fitting.profile import ProfileResult
 from fitting.result import FitResult
 from twin.drives import RackPinionDrive
 from twin.drives.rack_pinion_operation import table_response
@@ -41,8 +42,8 @@ def summarise(curves: CurveFits, sweeps: SweepStudy, direct: DirectStudy, valida
     """
     return {
         "curve_fit": {
-            "stiffness": _curve(curves.clean[0], curves.scattered[0], ("k1", "k2")),
-            "damping": _curve(curves.clean[1], curves.scattered[1], ("d1", "d2", "d3")),
+            "stiffness": _curve(curves.clean[0], curves.scattered[0], curves.profiles[0], ("k1", "k2")),
+            "damping": _curve(curves.clean[1], curves.scattered[1], curves.profiles[1], ("d1", "d2", "d3")),
         },
         "chain": _chain(sweeps),
         "chain_fit": {
@@ -55,8 +56,10 @@ def summarise(curves: CurveFits, sweeps: SweepStudy, direct: DirectStudy, valida
         "linearised": _linearised(sweeps),
         "direct": {name: _direct(getattr(direct.fits, name)) for name in ("frf", "time", "joint")},
         "static": _parameters(direct.static),
+        "truth": _truth(),
         "validation": {
             "mae_nm": list(validation.mean_absolute_errors),
+            "mae_while_moving_nm": list(validation.errors_while_moving),
             "published_mae_nm": list(PUBLISHED["validation"]),
             "motors": _parameters(validation.motors),
         },
@@ -66,13 +69,44 @@ def summarise(curves: CurveFits, sweeps: SweepStudy, direct: DirectStudy, valida
     }
 
 
-def _curve(clean: LoadSurfaceFit, scattered: LoadSurfaceFit, names: tuple[str, ...]) -> dict[str, Any]:
+def _truth() -> dict[str, float]:
+    """What the bench has where a fit gives a number."""
+    drive: Any = bench_drive()
+    mesh = drive.train_1.mesh
+    return {
+        "stiffness.k1": float(mesh.stiffness.k1),
+        "stiffness.k2": float(mesh.stiffness.k2),
+        "damping.d1": float(mesh.damping.d1),
+        "damping.d2": float(mesh.damping.d2),
+        "damping.d3": float(mesh.damping.d3),
+        "backlash.play": float(mesh.backlash.play),
+        "inertia": float(drive.train_1.inertia),
+        "table_friction.coulomb": float(drive.table_friction.coulomb),
+        "table_friction.viscous": float(drive.table_friction.viscous),
+        "friction.coulomb": float(drive.train_1.friction.coulomb),
+        "friction.viscous": float(drive.train_1.friction.viscous),
+    }
+
+
+def _curve(
+    clean: LoadSurfaceFit, scattered: LoadSurfaceFit, profiles: ProfileResult, names: tuple[str, ...]
+) -> dict[str, Any]:
+    """Printed values found again; with scatter also the profile's intervals, null where the points set no limit."""
     found = {name: float(clean.result[name].value) for name in names}
     return {
         **found,
         "error_percent": clean.error_percent,
         "with_4_percent_scatter": {
-            **{name: scattered.result[name]._asdict() for name in names},
+            **{
+                name: {
+                    **scattered.result[name]._asdict(),
+                    "interval_95": [
+                        None if none else end
+                        for end, none in zip(profiles[name].interval, profiles[name].open, strict=True)
+                    ],
+                }
+                for name in names
+            },
             "error_percent": scattered.error_percent,
         },
     }

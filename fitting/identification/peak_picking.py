@@ -27,6 +27,23 @@ class Peak(NamedTuple):
     """Damping ratio D = d/(2·√(k·m)) [-]; for `paper` as printed, D = 1/(2·|G(jω₀)|)."""
 
 
+class NoCrossing(InputError):
+    """A response whose phase does not fall through -90° in the band."""
+
+
+def check_estimator(estimator: str) -> None:
+    """Raise unless the estimator is known.
+
+    Args:
+        estimator: "paper" or "exact".
+
+    Raises:
+        InputError: if it is another.
+    """
+    if estimator not in ESTIMATORS:
+        raise InputError(f'estimator must be "paper" or "exact", but is {estimator!r}. Choose one of the two.')
+
+
 def pick_peak(
     frequency: Float[ArrayLike, "_"],
     response: Complex[ArrayLike, "_"],
@@ -59,10 +76,10 @@ def pick_peak(
 
     Raises:
         InputError: unknown estimator, a mass that is not positive, values that are not finite, frequencies that do not
-            increase, or no -90° point in the band.
+            increase.
+        NoCrossing: no -90° point in the band.
     """
-    if estimator not in ESTIMATORS:
-        raise InputError(f'estimator must be "paper" or "exact", but is {estimator!r}. Choose one of the two.')
+    check_estimator(estimator)
     positive("mass", mass, "kg")
     f, g = np.asarray(frequency, dtype=float), np.asarray(response)
     if f.ndim != 1 or f.shape != g.shape:
@@ -89,7 +106,7 @@ def _crossing(f: np.ndarray, g: np.ndarray, band: tuple[float, float]) -> tuple[
     falls = np.flatnonzero((real[:-1] > 0) & (real[1:] <= 0) & (imaginary[:-1] < 0))
     if falls.size == 0:
         where = f"from {f[0]:g} to {f[-1]:g} Hz" if f.size else f"between {band[0]:g} and {band[1]:g} Hz"
-        raise InputError(
+        raise NoCrossing(
             f"The phase of the response does not fall through -90° {where}. Widen the band, excite it higher, or check "
             "that input and output are not exchanged."
         )

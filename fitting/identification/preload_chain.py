@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from fitting.identification.load_surface import LoadSurfaceFit, fit_hyperbolic_damping, fit_root_stiffness
-from fitting.identification.peak_picking import Peak, pick_peak
+from fitting.identification.peak_picking import NoCrossing, Peak, check_estimator, pick_peak
 from fitting.identification.preload_sweep import PreloadSweep
 from twin._checks import InputError
 from twin.drives import RackPinionDrive
@@ -80,6 +80,7 @@ def identify_preload_chain(
     band: tuple[float, float] = (30.0, 200.0),
     leave_out_up_to: float = 6.0,
     guide_damping: float = 0.0,
+    sample_rate: float = 1000.0,
     responses: Sequence[FRF] | None = None,
 ) -> PreloadChain:
     """k(F) and d(F) of one drive train from sweeps at several preloads (Leipe et al., section V).
@@ -94,6 +95,7 @@ def identify_preload_chain(
         band: where the peaks are looked for [Hz].
         leave_out_up_to: preloads up to this one are shown but not fitted, as backlash distorts them [%].
         guide_damping: slope of the table's friction for "exact" [Ns/m].
+        sample_rate: rate at which velocities are formed, see `PreloadSweep.velocities` [Hz].
         responses: responses of the sweeps where they are known already; estimated if not given.
 
     Raises:
@@ -102,11 +104,12 @@ def identify_preload_chain(
     """
     if responses is not None and len(responses) != len(sweeps):
         raise InputError(f"{len(sweeps)} sweeps and {len(responses)} responses were given. Give one response for each.")
+    check_estimator(estimator)
     mass = float(drive.table_mass)
     found = []
     for i, sweep in enumerate(sweeps):
-        response = sweep.response(band=band) if responses is None else responses[i]
-        used = sweep.preload_percent > leave_out_up_to
+        response = sweep.response(sample_rate=sample_rate, band=band) if responses is None else responses[i]
+        used = abs(sweep.preload_percent) > leave_out_up_to
         try:
             peak = pick_peak(
                 response.frequency,
@@ -116,7 +119,7 @@ def identify_preload_chain(
                 guide_damping=guide_damping,
                 band=band,
             )
-        except InputError as error:
+        except NoCrossing as error:
             if used:
                 raise InputError(f"At {sweep.preload_percent:g} % preload: {error}") from error
             peak = None

@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 
 from fitting.fit import fit
 from fitting.identification.preload_sweep import PreloadSweep
+from fitting.identification.static_stiffness import LEAST_ORDER
 from fitting.residuals.driven_table import DrivenTableResidual
 from fitting.residuals.preloaded_response import PreloadedResponseResidual
 from fitting.residuals.residual import JointResidual
@@ -32,14 +33,14 @@ _FIRST, _SECOND = "drive.train_1.mesh.", "drive.train_2.mesh."
 def mesh_space() -> ParameterSpace:
     """k1, k2 and d1, d2, d3 of a `DrivenTable`, the same in both drive trains."""
     names = (
-        ("stiffness.k1", "N/m"),
-        ("stiffness.k2", "1"),
-        ("damping.d1", "N^2 s/m"),
-        ("damping.d2", "N"),
-        ("damping.d3", "N s/m"),
+        ("stiffness.k1", "N/m", 0.0),
+        ("stiffness.k2", "1", LEAST_ORDER),
+        ("damping.d1", "N^2 s/m", 0.0),
+        ("damping.d2", "N", 0.0),
+        ("damping.d3", "N s/m", 0.0),
     )
     return ParameterSpace(
-        Parameter(_FIRST + name, unit, lower=0.0, scale="log", tied=(_SECOND + name,)) for name, unit in names
+        Parameter(_FIRST + name, unit, lower=lower, scale="log", tied=(_SECOND + name,)) for name, unit, lower in names
     )
 
 
@@ -83,12 +84,12 @@ def with_zeros(table: DrivenTable, sweep: PreloadSweep) -> DrivenTable:
         table: the driven table.
         sweep: a record at a preload that keeps both flanks in contact.
     """
-    first = int(np.searchsorted(np.asarray(sweep.record.times), sweep.start))
+    record = sweep.during()
     forces = table.drive.motor_force(sweep.motor_torques())
     zeros = []
     for i, train in enumerate((table.drive.train_1, table.drive.train_2)):
-        apart = sweep.record.channel(f"position_{i + 1}") - sweep.record.channel("table_position")
-        zeros.append(jnp.mean(apart[first:]) - train.mesh.deflection(forces[i]))
+        apart = record.channel(f"position_{i + 1}") - record.channel("table_position")
+        zeros.append(jnp.mean(apart) - train.mesh.deflection(forces[i]))
     return dataclasses.replace(table, zero_1=zeros[0], zero_2=zeros[1])
 
 
@@ -97,7 +98,7 @@ def response_evidence(
 ) -> PreloadedResponseResidual:
     """Evidence from the complex responses of all sweeps, about the motor forces that their mean torques make.
 
-    The friction of the motors adds to one force and takes from the other, and drops out of the totals.
+    The friction of the motors adds to one force and takes from the other, and drops out of the totals to first order.
 
     Args:
         sweeps: one record for each preload, excited on the same velocity.
@@ -109,6 +110,13 @@ def response_evidence(
     """
     if not sweeps or len(sweeps) != len(responses):
         raise InputError(f"{len(sweeps)} sweeps and {len(responses)} responses were given. Give one response for each.")
+    grid = np.asarray(responses[0].frequency)
+    for sweep, response in zip(sweeps, responses, strict=True):
+        if not np.array_equal(np.asarray(response.frequency), grid) or sweep.velocity != sweeps[0].velocity:
+            raise InputError(
+                f"The sweep at {sweep.preload_percent:g} % has other frequencies or another velocity than the first. "
+                "Estimate all responses with the same windows and band, on one velocity."
+            )
     if any(response.variance is None for response in responses):
         raise InputError("A response has no variance to weight by. Estimate it from more than one window.")
     return PreloadedResponseResidual(
@@ -145,7 +153,10 @@ class DirectFits:
     """The same laws from three kinds of evidence; the model of each is a `DrivenTable`.
 
     Every piece of evidence is weighted by the scatter that it shows about its own fit, as many independent samples as
-    its correlation leaves: what a model does not know, such as cogging, hangs together over thousands of samples.
+    its correlation leaves: what a model does not know, such as cogging, hangs together over thousands of samples. The
+    scatter of motions is that of the table's position; preload forces are scaled with it. An error that is the same in
+    all samples is no scatter: such intervals do not cover it. As information adds up, those of the joint fit are the
+    narrowest by construction.
     """
 
     frf: FitResult
@@ -173,7 +184,7 @@ def fit_direct(
     if not time:
         raise InputError("There is no motion to fit to. Give at least one DrivenTableResidual by name.")
     names, evidence = ("responses", *time), (frf, *time.values())
-    only_motions = [path for path in space.paths if path not in mesh_space().paths]
+    only_motions = [path for path in space.paths if path in motion_space(play=True).paths[len(mesh_space()) :]]
     silent = [np.inf] * len(time)
 
     def run(weights: Sequence[float], model: DrivenTable, hold: Sequence[str] = ()) -> FitResult:

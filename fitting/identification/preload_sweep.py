@@ -32,6 +32,8 @@ class PreloadSweep:
     """Time at which the sweep begins, after the drive has settled [s]."""
     velocity: float = 0.005
     """Velocity on which the sweep is put [m/s]."""
+    end: float | None = None
+    """Time at which the sweep, and the steady motion, ends [s]; None: with the record."""
 
     def __post_init__(self):
         for name in _NEEDED:
@@ -41,16 +43,24 @@ class PreloadSweep:
                 f"The sweep starts at {self.start:g} s, but {self.record.name} ends at "
                 f"{float(self.record.times[-1]):g} s. Correct the start."
             )
+        if self.end is not None and not self.start < self.end:
+            raise InputError(f"The sweep ends at {self.end:g} s, but starts at {self.start:g} s. Correct the end.")
+
+    def during(self) -> Record:
+        """The record from the start to the end of the sweep."""
+        last = float(self.record.times[-1]) if self.end is None else self.end
+        return self.record.slice(self.start, last)
 
     def motor_torques(self) -> Float[Array, "2"]:
         """Mean torque of each motor during the sweep [Nm]."""
-        first = int(np.searchsorted(np.asarray(self.record.times), self.start))
-        return jnp.stack([jnp.mean(self.record.channel(name)[first:]) for name in ("torque_1", "torque_2")])
+        record = self.during()
+        return jnp.stack([jnp.mean(record.channel(name)) for name in ("torque_1", "torque_2")])
 
     def velocities(self, sample_rate: float) -> Record:
         """Velocities of motors and table during the sweep, by differences of the positions at a lower rate.
 
-        The same difference is formed of all positions, so that it drops out of their ratios.
+        The same difference is formed of all positions, so that it drops out of their ratios. Every so many samples are
+        taken as they are: what moves faster than half the lower rate folds back, so filter a record that has such.
 
         Args:
             sample_rate: rate of the result [Hz].
@@ -64,16 +74,17 @@ class PreloadSweep:
         if every < 1 or abs(ratio - every) > 1e-3 * ratio:
             raise InputError(
                 f"sample_rate is {sample_rate:g} Hz, but {self.record.name} was sampled at "
-                f"{float(self.record.sample_rate):g} Hz. Give a rate that divides it."
+                f"{float(self.record.sample_rate):g} Hz. Give a sample_rate that divides it, such as its own."
             )
-        times = np.asarray(self.record.times)
-        rows = slice(int(np.searchsorted(times, self.start)), None, every)
+        record = self.during()
         channels = {
-            name: np.diff(np.asarray(self.record.channel(source))[rows]) * sample_rate
-            for source, name in _MOVING.items()
+            name: np.diff(np.asarray(record.channel(source))[::every]) * sample_rate for source, name in _MOVING.items()
         }
         return Record.create(
-            times[rows][1:], channels, dict.fromkeys(channels, "m/s"), name=f"velocities of {self.record.name}"
+            np.asarray(record.times)[::every][1:],
+            channels,
+            dict.fromkeys(channels, "m/s"),
+            name=f"velocities of {self.record.name}",
         )
 
     def response(

@@ -15,6 +15,9 @@ from twin.laws import AbstractMesh
 from twin.parameters import Parameter, ParameterSpace
 from twin.record import Record
 
+LEAST_ORDER = 1.01
+"""Lower bound of k2: the tangent reading needs it above 1."""
+
 
 class StaticMesh(eqx.Module):
     """A mesh under the torque of its motor, at rest."""
@@ -110,7 +113,7 @@ def identify_static_stiffness(
     space = ParameterSpace(
         [
             Parameter("mesh.stiffness.k1", "N/m", lower=0.0, scale="log"),
-            Parameter("mesh.stiffness.k2", "1", lower=1.0, scale="log"),
+            Parameter("mesh.stiffness.k2", "1", lower=LEAST_ORDER, scale="log"),
             Parameter("mesh.backlash.play", "m", lower=0.0, size=1e-5),
             Parameter("friction", "N m", size=0.1),
             Parameter("zero", "m", size=1e-5),

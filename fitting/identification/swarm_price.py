@@ -16,7 +16,8 @@ def swarm_price(
 ) -> tuple[SwarmResult, int]:
     """What a swarm pays for the error of a curve fit (Leipe et al., eq. 5), and what the gradient fit paid.
 
-    A gradient fit pays one evaluation for each residual and one more for each column of its Jacobian. The swarm looks
+    A gradient fit pays one evaluation for each residual and one more for each column of its Jacobian, and for its
+    start: a straight line, or a linear problem at each of nine d2. The swarm looks
     between a thirtieth and thirty times the answer, and stops as soon as its error is as small but for a part in a
     million.
 
@@ -45,7 +46,8 @@ def swarm_price(
         return np.sqrt(np.sum(errors**2, axis=1) / np.sum(totals**2))  # eq. 5a
 
     swarm = particle_swarm(cost, lower, upper, target=found.error_percent / 100 * (1 + 1e-6))
-    return swarm, (result.steps + 1) * (len(result.values) + 1)
+    start = 1 if law is _root else 9
+    return swarm, start + (result.steps + 1) * (len(result.values) + 1)
 
 
 def _root(p: np.ndarray, magnitude: np.ndarray) -> np.ndarray:

@@ -54,7 +54,7 @@ class DrivenTableResidual(AbstractResidual):
     table_velocity: Float[Array, "records"]
     """Table velocity at the start of each record [m/s]."""
     preload_force: Float[Array, "records"]
-    """Mean over each record of half the difference of the motors' forces [N]."""
+    """Mean over each record, once settled, of half the difference of the motors' forces [N]."""
     position_deviation: Float[Array, ""]
     """Standard deviation of the table position [m]."""
     force_deviation: Float[Array, ""]
@@ -110,7 +110,7 @@ class DrivenTableResidual(AbstractResidual):
             for record in records
         ]
         table = np.stack([np.asarray(record.channel("table_position")) for record in records])
-        difference = [0.5 * float(jnp.mean(r.channel("torque_1") - r.channel("torque_2"))) for r in records]
+        difference = [0.5 * float(jnp.mean((r.channel("torque_1") - r.channel("torque_2"))[settled:])) for r in records]
         return DrivenTableResidual(
             times=jnp.asarray(times),
             motors=jax.tree.map(lambda *leaves: jnp.stack(leaves), *motors),
@@ -127,7 +127,7 @@ class DrivenTableResidual(AbstractResidual):
             start = DrivenTableState(position[0], velocity, model.drive.table_friction.initial_state())
             found = simulate(model, motors, self.times, initial_state=start, stepping=self.stepping).outputs
             error = (found.table_position - position)[self.settled :]
-            return error, jnp.mean(found.preload_force)
+            return error, jnp.mean(found.preload_force[self.settled :])
 
         axes = jax.tree.map(lambda _: 0, self.motors)
         error, force = jax.vmap(one, in_axes=(axes, 0, 0))(self.motors, self.table_position, self.table_velocity)

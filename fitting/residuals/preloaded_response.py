@@ -29,7 +29,7 @@ class PreloadedResponseResidual(AbstractResidual):
     variance: Float[Array, "preloads _"] = eqx.field(converter=as_array)
     """Variance of each, both parts together."""
     forces: Float[Array, "preloads 2"] = eqx.field(converter=as_array)
-    """Forces through the meshes at each preload [N]."""
+    """Forces through the meshes at each preload, or the motors' forces in their place [N]."""
     velocity: Float[Array, ""] = eqx.field(converter=as_scalar)
     """Velocity on which the excitation is put [m/s]."""
 

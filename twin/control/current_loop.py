@@ -91,7 +91,10 @@ class CurrentLoop(AbstractPlant):
 
     def initial_state(self) -> CurrentLoopState:
         rest = self.plant.rest_inputs().command
-        return CurrentLoopState(self.plant.initial_state(), rest, rest)
+        current = jax.tree.map(lambda command: command / self.torque_constant, rest)
+        return CurrentLoopState(
+            self.plant.initial_state(), current, jax.tree.map(lambda i: self.resistance * i, current)
+        )
 
     def rest_inputs(self) -> Any:
         return self.plant.rest_inputs()

@@ -8,6 +8,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from twin._checks import positive
 from twin.drives.rack_pinion import RackPinionDrive
+from twin.drives.rack_pinion_operation import friction_level
 
 
 def reconstruct_table_position(
@@ -51,17 +52,19 @@ def mesh_forces_of_motion(
     """Forces through the meshes during a motion: motor forces less the motors' inertia and friction [N].
 
     Args:
-        drive: the drive; motors whose friction has memory are taken at its first state.
+        drive: the drive.
         torques: torques of motor 1 and 2 [Nm].
         velocity: set or measured velocity of the table [m/s].
         acceleration: set or measured acceleration [m/s²].
+
+    Raises:
+        InputError: if a motor's friction has memory.
     """
     r = drive.travel_per_radian
     tau, v, a = jnp.asarray(torques), jnp.asarray(velocity), jnp.asarray(acceleration)
 
     def force(train: Any, torque: Array) -> Array:
-        law = train.friction
-        friction = law.force(law.initial_state(), v / r, jnp.zeros_like(v))
+        friction = friction_level("friction of a motor", train.friction, v / r)
         return (torque - friction - train.inertia * a / r) / r
 
     return jnp.stack([force(drive.train_1, tau[0]), force(drive.train_2, tau[1])])

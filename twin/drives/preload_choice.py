@@ -59,7 +59,7 @@ def preload_for_stiffness(
     resistance: float,
     load: Float[ArrayLike, ""] = 0.0,
     velocity: Float[ArrayLike, ""] = 0.0,
-    reserve: float = 0.0,
+    reserve: float = 50.0,
 ) -> PreloadChoice:
     """The smallest preload that keeps a stiffness under a process force, with both motors against opposite flanks.
 
@@ -74,12 +74,13 @@ def preload_for_stiffness(
         resistance: resistance of a winding R [Ohm].
         load: process force on the table, positive in the direction of motion [N].
         velocity: velocity of the table [m/s].
-        reserve: force that is to stay on the flank of the motor that carries less [N].
+        reserve: force that is to stay on the flank of the motor that carries less [N]. Near zero the laws no longer
+            hold: k(F) stays what it is at its width, while flanks in their play have no stiffness at all.
 
     Raises:
         InputError: a stiffness, torque, constant or resistance that is not positive; a load or velocity that is not
             finite; a negative reserve; a stiffness that not even the rated torque gives; a load that leaves no room
-            for a preload.
+            for a preload. Under a transformation that hides the values, what cannot be is NaN.
     """
     for name, value, unit in (
         ("stiffness", stiffness, "N/m"),
@@ -120,21 +121,26 @@ def _choose(
     r = drive.travel_per_radian
     bare = jnp.stack(preloaded_torques(drive, 0.0, velocity=velocity, load=load))
     through = mesh_forces(drive, bare, velocity)
-    # Without preload both flanks carry the same; this much is needed to bring one of them to its reserve.
-    least = r * (jnp.max(jnp.abs(through)) + reserve)
+    # Motor 1 is to be left with the reserve forwards, motor 2 backwards.
+    least = r * (reserve + jnp.maximum(-through[0], through[1]))
     most = rated_torque - jnp.max(jnp.abs(bare))
     best = total_stiffness(drive, most, load=load, velocity=velocity)
 
     def missing(preload: Array, given: tuple) -> Array:
-        drive, load, velocity = given
-        return total_stiffness(drive, preload, load=load, velocity=velocity) / stiffness - 1
+        drive, load, velocity, wanted = given
+        return total_stiffness(drive, preload, load=load, velocity=velocity) / wanted - 1
 
     enough = total_stiffness(drive, least, load=load, velocity=velocity) >= stiffness
+    possible = (least <= most) & (best >= stiffness)
+    # Where nothing is to be searched for, the search gets something to find: its derivative must stay finite.
+    middle = 0.5 * (least + most)
+    easy = total_stiffness(drive, middle, load=load, velocity=velocity)
+    wanted = jnp.where(enough | ~possible, easy, stiffness)
     solver = optx.Bisection(rtol=_ACCURACY, atol=_ACCURACY, expand_if_necessary=True)
     found = optx.root_find(
-        missing, solver, 0.5 * (least + most), given, options={"lower": least, "upper": most}, throw=False
+        missing, solver, middle, (*given, wanted), options={"lower": least, "upper": most}, throw=False
     ).value
-    preload = jnp.where(enough, least, found)
+    preload = jnp.where(possible, jnp.where(enough, least, found), jnp.nan)
     torques = bare + jnp.stack([preload, -preload])
     choice = PreloadChoice(
         preload=preload,

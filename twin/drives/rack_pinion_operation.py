@@ -26,7 +26,7 @@ def mesh_forces(
     """
     tau = jnp.asarray(torques)
     speed = velocity / drive.travel_per_radian
-    lost = [_level("friction of a motor", train.friction, speed) for train in (drive.train_1, drive.train_2)]
+    lost = [friction_level("friction of a motor", train.friction, speed) for train in (drive.train_1, drive.train_2)]
     return jnp.stack([drive.motor_force(tau[i] - lost[i]) for i in range(2)])
 
 
@@ -50,9 +50,9 @@ def preloaded_torques(
     """
     r = drive.travel_per_radian
     motors = sum(
-        _level("friction of a motor", train.friction, velocity / r) for train in (drive.train_1, drive.train_2)
+        friction_level("friction of a motor", train.friction, velocity / r) for train in (drive.train_1, drive.train_2)
     )
-    guides = _level("table_friction", drive.table_friction, velocity)
+    guides = friction_level("table_friction", drive.table_friction, velocity)
     mean = 0.5 * (motors + r * (guides - load))
     return TorquePair(jnp.asarray(mean + preload), jnp.asarray(mean - preload))
 
@@ -129,12 +129,22 @@ def table_response(
     at = jnp.asarray(forces)
     (k_1, d_1), (k_2, d_2) = small_signal(drive.train_1.mesh, at[0]), small_signal(drive.train_2.mesh, at[1])
     v = jnp.asarray(velocity, dtype=jnp.float64)
-    guides = jax.jvp(lambda u: _level("table_friction", drive.table_friction, u), (v,), (jnp.ones_like(v),))[1]
+    guides = jax.jvp(lambda u: friction_level("table_friction", drive.table_friction, u), (v,), (jnp.ones_like(v),))[1]
     below = drive.table_mass * s**2 + (d_1 + d_2 + guides) * s + k_1 + k_2
     return jnp.stack([(d_1 * s + k_1) / below, (d_2 * s + k_2) / below])
 
 
-def _level(name: str, law: AbstractFriction, velocity: Any) -> Any:
+def friction_level(name: str, law: AbstractFriction, velocity: Any) -> Any:
+    """Friction of a law without memory at a steady speed [N or Nm].
+
+    Args:
+        name: what the law is the friction of, for the message.
+        law: the law.
+        velocity: speed [m/s or rad/s].
+
+    Raises:
+        InputError: if the law has memory.
+    """
     if not isinstance(law, AbstractStaticFriction):
         raise InputError(
             f"The {name} is {type(law).__name__}, a law with memory: its level at a steady speed is not known in "

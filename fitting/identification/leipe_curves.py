@@ -20,8 +20,6 @@ class CurveFits:
     """Stiffness and damping from points as they are."""
     scattered: tuple[LoadSurfaceFit, LoadSurfaceFit]
     """From points with a scatter of 4 % rms."""
-    profiles: tuple[ProfileResult, ProfileResult]
-    """Intervals of the scattered fits that need no linear theory: the totals hardly see where d(F) bends."""
     forces: np.ndarray
     """Motor forces of the points (2, points) [N]."""
     totals: tuple[np.ndarray, np.ndarray]
@@ -40,7 +38,7 @@ def fit_printed_curves(scatter: float = 0.04, seed: int = 1) -> CurveFits:
     # Near the angle bisector: what moves the table adds to one force and takes from the other.
     forces = np.asarray(drive.motor_force(np.stack([preload + 0.3, preload - 0.3])))
     random = np.random.default_rng(seed)
-    clean, scattered, profiles, totals = [], [], [], []
+    clean, scattered, totals = [], [], []
     laws = (RootStiffness(*STIFFNESS), HyperbolicDamping(*DAMPING))
     for law, identify in zip(laws, (fit_root_stiffness, fit_hyperbolic_damping), strict=True):
         total = np.asarray(total_over_contacts(law, forces))
@@ -48,9 +46,18 @@ def fit_printed_curves(scatter: float = 0.04, seed: int = 1) -> CurveFits:
         measured = total + scatter * noise * np.linalg.norm(total) / np.linalg.norm(noise)
         clean.append(identify(forces, total))
         scattered.append(identify(forces, measured))
-        evidence = LoadSurfaceResidual(forces, measured, float(np.sqrt(np.mean(measured**2))))
-        profiles.append(profile(evidence, scattered[-1].result))
         totals.append(measured)
-    return CurveFits(
-        (clean[0], clean[1]), (scattered[0], scattered[1]), (profiles[0], profiles[1]), forces, (totals[0], totals[1])
-    )
+    return CurveFits((clean[0], clean[1]), (scattered[0], scattered[1]), forces, (totals[0], totals[1]))
+
+
+def profile_curves(curves: CurveFits) -> tuple[ProfileResult, ProfileResult]:
+    """Intervals of the scattered fits that need no linear theory: the totals hardly see where d(F) bends.
+
+    Args:
+        curves: of `fit_printed_curves`.
+    """
+    found = []
+    for fit, measured in zip(curves.scattered, curves.totals, strict=True):
+        evidence = LoadSurfaceResidual(curves.forces, measured, float(np.sqrt(np.mean(measured**2))))
+        found.append(profile(evidence, fit.result, rounds=15))
+    return found[0], found[1]

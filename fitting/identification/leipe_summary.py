@@ -17,6 +17,7 @@ from fitting.identification.leipe import (
     choose_preloads,
 )
 from fitting.identification.leipe_bench import PERIOD, bench_drive
+from fitting.identification.leipe_curves import profile_curves
 from fitting.identification.leipe_reconstruction import reconstruct
 from fitting.identification.load_surface import LoadSurfaceFit
 from fitting.identification.preload_direct import curve_errors, curve_intervals
@@ -40,10 +41,11 @@ def summarise(curves: CurveFits, sweeps: SweepStudy, direct: DirectStudy, valida
         direct: direct fits.
         validation: the validation move.
     """
+    profiles = profile_curves(curves)
     return {
         "curve_fit": {
-            "stiffness": _curve(curves.clean[0], curves.scattered[0], curves.profiles[0], ("k1", "k2")),
-            "damping": _curve(curves.clean[1], curves.scattered[1], curves.profiles[1], ("d1", "d2", "d3")),
+            "stiffness": _curve(curves.clean[0], curves.scattered[0], profiles[0], ("k1", "k2")),
+            "damping": _curve(curves.clean[1], curves.scattered[1], profiles[1], ("d1", "d2", "d3")),
         },
         "chain": _chain(sweeps),
         "chain_fit": {

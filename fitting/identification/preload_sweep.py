@@ -48,8 +48,7 @@ class PreloadSweep:
 
     def during(self) -> Record:
         """The record from the start to the end of the sweep."""
-        last = float(self.record.times[-1]) if self.end is None else self.end
-        return self.record.slice(self.start, last)
+        return self.record.slice(self.start, self.end)
 
     def motor_torques(self) -> Float[Array, "2"]:
         """Mean torque of each motor during the sweep [Nm]."""

@@ -127,3 +127,16 @@ def test_it_runs_under_vmap():
 def test_bad_input_is_named(change, message):
     with pytest.raises(InputError, match=message):
         choose(**change)
+
+
+def test_in_a_batch_what_cannot_be_is_not_a_number():
+    loads = jnp.asarray([0.0, 1000.0, 20_000.0])
+    preloads = jax.vmap(lambda load: choose(load=load).preload)(loads)
+    np.testing.assert_array_equal(np.isnan(preloads), [False, False, True])
+    assert np.isnan(jax.jit(lambda load: choose(1.9e8, load=load).preload)(0.0))
+
+
+def test_derivative_where_the_reserve_decides():
+    slope = jax.grad(lambda load: choose(1e6, load=load).preload)(1000.0)
+    steps = [float(choose(1e6, load=1000.0 + h).preload) for h in (-1.0, 1.0)]
+    assert float(slope) == pytest.approx((steps[1] - steps[0]) / 2, rel=1e-6)

@@ -169,7 +169,7 @@ def _without(name):
         (lambda: PreloadSweep(8.0, SWEEPS[1].record, 31.0), "starts at 31 s, but a sweep ends at"),
         (lambda: PreloadSweep(8.0, SWEEPS[1].record, float("nan")), "starts at nan s"),
         (lambda: SWEEPS[1].velocities(900.0), "900 Hz, but a sweep was sampled at 2000 Hz"),
-        (lambda: SWEEPS[1].velocities(4000.0), "Give a rate that divides it"),
+        (lambda: SWEEPS[1].velocities(4000.0), "Give a sample_rate that divides it"),
         (lambda: SWEEPS[1].velocities(0.0), "sample_rate must be positive"),
         (lambda: PreloadSweep(8.0, SWEEPS[1].record.slice(0.0, 1.0), START).response(), "499 samples"),
         (lambda: SWEEPS[1].response(estimator="H4"), "estimator must be one of"),
@@ -179,3 +179,13 @@ def _without(name):
 def test_bad_input_is_named(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_a_sweep_with_an_end_leaves_the_rest_out():
+    whole = SWEEPS[1]
+    half = 0.5 * (whole.start + float(whole.record.times[-1]))
+    part = dataclasses.replace(whole, end=half)
+    assert float(part.during().times[-1]) < half
+    assert part.velocities(1000.0).times.size < 0.6 * whole.velocities(1000.0).times.size
+    with pytest.raises(InputError, match="Correct the end"):
+        dataclasses.replace(whole, end=whole.start)

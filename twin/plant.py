@@ -37,3 +37,13 @@ class AbstractPlant(eqx.Module):
 
         A controller around the plant sees the outputs at rest inputs, that is, without direct feed-through.
         """
+
+
+def told(outputs: Any, command: PyTree[Array]) -> Any:
+    """Outputs of a plant behind an actuator: its `command`, if it records one, is what the actuator was told.
+
+    Args:
+        outputs: of the plant.
+        command: of the actuator.
+    """
+    return outputs._replace(command=command) if "command" in outputs._fields else outputs

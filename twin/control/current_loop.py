@@ -9,10 +9,7 @@ from jaxtyping import Array, Float, PyTree
 
 from twin._checks import as_scalar, not_negative, positive
 from twin.laws import smooth_clip
-from twin.plant import AbstractPlant
-
-# The voltage limit is rounded over this part of itself.
-_ROUNDING = 1e-3
+from twin.plant import AbstractPlant, told
 
 
 class CurrentLoopState(NamedTuple):
@@ -109,11 +106,10 @@ class CurrentLoop(AbstractPlant):
         return CurrentLoopState(self.plant.vector_field(t, state.plant, self._behind(state, inputs)), current, integral)
 
     def outputs(self, t: Float[Array, ""], state: Any, inputs: Any) -> Any:
-        outputs = self.plant.outputs(t, state.plant, self._behind(state, inputs))
-        return outputs._replace(command=inputs.command) if "command" in outputs._fields else outputs
+        return told(self.plant.outputs(t, state.plant, self._behind(state, inputs)), inputs.command)
 
     def _limited(self, voltage: Array) -> Array:
-        return smooth_clip(voltage, self.voltage_limit, _ROUNDING * self.voltage_limit)
+        return smooth_clip(voltage, self.voltage_limit)
 
     def _behind(self, state: Any, inputs: Any) -> Any:
         return inputs._replace(command=jax.tree.map(lambda i: self.torque_constant * i, state.current))

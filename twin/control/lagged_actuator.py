@@ -7,7 +7,7 @@ import jax
 from jaxtyping import Array, Float, PyTree
 
 from twin._checks import as_scalar, finite, positive
-from twin.plant import AbstractPlant
+from twin.plant import AbstractPlant, told
 
 
 class LaggedActuatorState(NamedTuple):
@@ -49,8 +49,7 @@ class LaggedActuator(AbstractPlant):
         return LaggedActuatorState(self.plant.vector_field(t, state.plant, self._behind(state, inputs)), lag)
 
     def outputs(self, t: Float[Array, ""], state: Any, inputs: Any) -> Any:
-        outputs = self.plant.outputs(t, state.plant, self._behind(state, inputs))
-        return outputs._replace(command=inputs.command) if "command" in outputs._fields else outputs
+        return told(self.plant.outputs(t, state.plant, self._behind(state, inputs)), inputs.command)
 
     def _behind(self, state: Any, inputs: Any) -> Any:
         return inputs._replace(command=state.actual)

@@ -11,9 +11,6 @@ from twin.control.controller import AbstractController
 from twin.drives.rack_pinion import TorquePair
 from twin.laws import smooth_clip
 
-# The torque limit is rounded over this part of itself.
-_ROUNDING = 1e-3
-
 
 class CascadeGains(eqx.Module):
     """What a preload cascade is set to: Leipe et al., fig. 2.
@@ -57,7 +54,7 @@ class CascadeGains(eqx.Module):
         finite("acceleration_feedforward", self.acceleration_feedforward)
         if self.feedback not in ("table", "motors"):
             raise InputError(f'feedback must be "table" or "motors", but is {self.feedback!r}. Choose one of the two.')
-        check_preload(self.preload, self.rated_torque)
+        _check_preload(self.preload, self.rated_torque)
 
     def correction(self, reference: Any, measurement: Any) -> Float[Array, ""]:
         """Velocity that the common position controller asks for [m/s].
@@ -86,19 +83,10 @@ class CascadeGains(eqx.Module):
         Args:
             torque: torque before the limit [Nm].
         """
-        return smooth_clip(torque, self.torque_limit, _ROUNDING * self.torque_limit)
+        return smooth_clip(torque, self.torque_limit)
 
 
-def check_preload(preload: Any, rated_torque: Any) -> None:
-    """Raise unless a preload stays within the motors' rated torque.
-
-    Args:
-        preload: preload torque [Nm].
-        rated_torque: rated torque of the motors [Nm].
-
-    Raises:
-        InputError: if it does not.
-    """
+def _check_preload(preload: Any, rated_torque: Any) -> None:
     if not (is_concrete(preload) and is_concrete(rated_torque)):
         return
     if not all(isinstance(x, Array) for x in (preload, rated_torque)):

@@ -10,9 +10,6 @@ from twin._checks import as_scalar, positive
 from twin.laws import AbstractFriction, AbstractMesh, AbstractPositionForce, NoForce, smooth_clip
 from twin.plant import AbstractPlant
 
-# The torque limit is rounded over this part of itself.
-_ROUNDING = 1e-3
-
 
 class TorquePair(NamedTuple):
     """One torque for each of the two motors."""
@@ -108,7 +105,7 @@ class DriveTrain(eqx.Module):
         Args:
             command: torque that it is told to give [Nm].
         """
-        return smooth_clip(command, self.torque_limit, _ROUNDING * self.torque_limit)
+        return smooth_clip(command, self.torque_limit)
 
 
 class RackPinionDrive(AbstractPlant):

@@ -78,19 +78,21 @@ def positive_power(base: Float[ArrayLike, "*batch"], exponent: Float[ArrayLike, 
 
 
 def smooth_clip(
-    value: Float[ArrayLike, "*batch"], limit: Float[ArrayLike, ""], width: Float[ArrayLike, ""]
+    value: Float[ArrayLike, "*batch"], limit: Float[ArrayLike, ""], width: Float[ArrayLike, ""] | None = None
 ) -> Float[Array, "*batch"]:
     """A value within ±limit: ½·(√((v + L)² + w²) - √((v - L)² + w²)), odd, increasing, never beyond the limit.
 
     Args:
         value: v, any shape, any unit.
         limit: L, positive and finite, in the unit of v.
-        width: w, positive, in the unit of v: how far before the limit the curve begins to bend.
+        width: w, positive, in the unit of v: how far before the limit the curve begins to bend; a thousandth of the
+            limit if not given.
 
     Returns:
         The limited value in the shape of v.
     """
     v = jnp.asarray(value)
+    width = 1e-3 * limit if width is None else width
     # The difference of the two roots without cancellation.
     return jnp.asarray(2 * limit * v) / (smooth_abs(v + limit, width) + smooth_abs(v - limit, width))
 

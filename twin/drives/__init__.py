@@ -1,18 +1,36 @@
 """Plants: one drive per file."""
 
 from twin.drives.against_stop import AgainstStop as AgainstStop
+from twin.drives.ball_screw import BallScrewAxis as BallScrewAxis
+from twin.drives.ball_screw_catalogue import ball_screw_axis as ball_screw_axis
+from twin.drives.ball_screw_modes import SpringDeformations as SpringDeformations
+from twin.drives.ball_screw_modes import spring_deformations as spring_deformations
+from twin.drives.ball_screw_modes import structural_damping as structural_damping
+from twin.drives.ball_screw_state import BallScrewState as BallScrewState
+from twin.drives.dc_motor import DcMotor as DcMotor
 from twin.drives.driven_table import DrivenTable as DrivenTable
 from twin.drives.driven_table import DrivenTableInputs as DrivenTableInputs
 from twin.drives.driven_table import DrivenTableState as DrivenTableState
 from twin.drives.driven_table import MotorMotion as MotorMotion
 from twin.drives.inputs import DriveInputs as DriveInputs
 from twin.drives.leipe import leipe_drive as leipe_drive
+from twin.drives.mauro import mauro_axis as mauro_axis
 from twin.drives.rack_pinion import DriveTrain as DriveTrain
 from twin.drives.rack_pinion import RackPinionDrive as RackPinionDrive
 from twin.drives.rack_pinion import RackPinionInputs as RackPinionInputs
 from twin.drives.rack_pinion import RackPinionOutputs as RackPinionOutputs
 from twin.drives.rack_pinion import RackPinionState as RackPinionState
 from twin.drives.rack_pinion import TorquePair as TorquePair
+from twin.drives.rigid_screw_axis import RigidScrewAxis as RigidScrewAxis
+from twin.drives.rigid_screw_axis import RigidScrewState as RigidScrewState
+from twin.drives.screw_damping import AbstractScrewDamping as AbstractScrewDamping
+from twin.drives.screw_damping import SpringDampers as SpringDampers
+from twin.drives.screw_damping import StructuralDamping as StructuralDamping
+from twin.drives.screw_matrices import ScrewMatrices as ScrewMatrices
+from twin.drives.screw_outputs import ScrewAxisOutputs as ScrewAxisOutputs
+from twin.drives.screw_springs import PerSpring as PerSpring
+from twin.drives.screw_springs import ScrewShaft as ScrewShaft
+from twin.drives.screw_springs import ScrewSprings as ScrewSprings
 from twin.drives.servo_axis import ServoAxis as ServoAxis
 from twin.drives.servo_axis import ServoAxisOutputs as ServoAxisOutputs
 from twin.drives.servo_axis import ServoAxisState as ServoAxisState

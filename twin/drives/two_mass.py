@@ -3,11 +3,11 @@
 from typing import Any, NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float, PyTree
 
-from twin._checks import InputError, as_scalar, finite, not_negative, positive
+from twin._checks import as_scalar, finite, not_negative, positive
+from twin.drives.friction_slope import friction_slope
 from twin.drives.inputs import DriveInputs, no_inputs
 from twin.laws import AbstractFriction
 from twin.linear import SecondOrder
@@ -136,8 +136,8 @@ class TwoMass(AbstractPlant):
             InputError: if a friction law has memory: its force has no slope over the speed alone; use `linearise`.
         """
         k, d, zero = self.stiffness, self.damping, jnp.zeros(())
-        motor = _slope("motor_friction", self.motor_friction, velocity)
-        load = _slope("load_friction", self.load_friction, velocity)
+        motor = friction_slope("motor_friction", self.motor_friction, velocity)
+        load = friction_slope("load_friction", self.load_friction, velocity)
         return SecondOrder(
             mass=jnp.diag(jnp.stack([self.motor_inertia, self.load_inertia])),
             viscous=jnp.stack([jnp.stack([d + motor, -d]), jnp.stack([-d, d + load])]),
@@ -148,14 +148,3 @@ class TwoMass(AbstractPlant):
             inputs=("command", "load"),
             outputs=("position", "load_position"),
         )
-
-
-def _slope(name: str, law: AbstractFriction, velocity: Float[ArrayLike, ""]) -> Float[Array, ""]:
-    memory = law.initial_state()
-    if jax.tree.leaves(memory):
-        raise InputError(
-            f"{name} is {type(law).__name__}, a law with memory, which has no slope over the speed alone. "
-            "Use twin.linear.linearise, which keeps its state."
-        )
-    at = jnp.asarray(velocity, dtype=jnp.float64)
-    return jax.jvp(lambda v: law.force(memory, v, 0.0), (at,), (jnp.ones_like(at),))[1]

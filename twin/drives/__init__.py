@@ -4,6 +4,8 @@ from twin.drives.against_stop import AgainstStop as AgainstStop
 from twin.drives.ball_screw import BallScrewAxis as BallScrewAxis
 from twin.drives.ball_screw_catalogue import ball_screw_axis as ball_screw_axis
 from twin.drives.ball_screw_modes import SpringDeformations as SpringDeformations
+from twin.drives.ball_screw_modes import lumped_elasticities as lumped_elasticities
+from twin.drives.ball_screw_modes import screw_elasticities as screw_elasticities
 from twin.drives.ball_screw_modes import spring_deformations as spring_deformations
 from twin.drives.ball_screw_modes import structural_damping as structural_damping
 from twin.drives.ball_screw_state import BallScrewState as BallScrewState

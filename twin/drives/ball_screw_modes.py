@@ -1,5 +1,6 @@
 """Modal analysis of a ball screw axis: damping from a ratio, deformation of the springs."""
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -10,7 +11,22 @@ from twin._checks import InputError, not_negative
 from twin.drives.ball_screw import BallScrewAxis
 from twin.drives.screw_damping import StructuralDamping
 from twin.drives.screw_springs import PerSpring
-from twin.modal import modes
+from twin.modal import Elasticities, elasticities, modes
+
+STIFFNESSES = (
+    "springs.motor_shaft",
+    "springs.coupling",
+    "springs.screw_end",
+    "springs.screw.axial_rigidity",
+    "springs.screw.torsional_rigidity",
+    "springs.support",
+    "springs.bearing",
+    "springs.nut",
+    "springs.flange",
+)
+"""Paths of everything that is stiff in a ball screw axis."""
+INERTIAS = ("motor_inertia", "end_inertia", "screw_inertia", "screw_mass", "nut_mass", "slide_mass")
+"""Paths of the masses and inertias of a ball screw axis."""
 
 
 class SpringDeformations(NamedTuple):
@@ -67,6 +83,40 @@ def spring_deformations(
     h = axis.travel_per_radian
     raw = PerSpring(motor - end, end - screw, shift, shift + h * screw - nut, nut - slide)
     return SpringDeformations(raw, raw._replace(shaft=h * raw.shaft, torsion=h * raw.torsion))
+
+
+def screw_elasticities(
+    axis: BallScrewAxis,
+    paths: Iterable[str] = STIFFNESSES + INERTIAS,
+    *,
+    nut_position: Float[ArrayLike, ""] | None = None,
+) -> Elasticities:
+    """Elasticity d ln f / d ln p of the six natural frequencies to the axis's parameters.
+
+    Args:
+        axis: ball screw axis.
+        paths: dotted paths of the parameters; all stiffnesses, masses and inertias if not given.
+        nut_position: distance of the nut from the fixed bearing [m]; that at mid-stroke if not given.
+
+    Raises:
+        InputError: a path that the axis does not have, a nut outside the screw.
+    """
+    return elasticities(axis, paths, system=lambda a: a.second_order(nut_position))
+
+
+def lumped_elasticities(axis: BallScrewAxis, *, nut_position: Float[ArrayLike, ""] | None = None) -> Elasticities:
+    """Elasticity of the six natural frequencies to the five springs k₁₂ᵀ, k₂₃ᵀ, k₀ᴬ, k₁₂ᴬ, k₂₃ᴬ.
+
+    Args:
+        axis: ball screw axis.
+        nut_position: distance of the nut from the fixed bearing [m]; that at mid-stroke if not given.
+
+    Raises:
+        InputError: a nut outside the screw.
+    """
+    return elasticities(
+        axis.stiffness(nut_position), PerSpring._fields, system=lambda k: axis.second_order(stiffness=k)
+    )
 
 
 def _elastic(mode: int) -> int:

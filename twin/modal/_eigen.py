@@ -73,8 +73,17 @@ def guarded_root(values: Float[Array, "n"]) -> Float[Array, "n"]:
     Returns:
         √λ.
     """
-    zero = jnp.abs(values) <= REPEATED * jnp.max(jnp.abs(values))
+    zero = is_zero(values)
     return jnp.where(zero, 0.0, jnp.sqrt(jnp.where(zero, 1.0, values)))
+
+
+def is_zero(values: Float[Array, "n"]) -> Array:
+    """Which eigenvalues are zero but for rounding, a boolean vector.
+
+    Args:
+        values: eigenvalues.
+    """
+    return jnp.abs(values) <= REPEATED * jnp.max(jnp.abs(values))
 
 
 def _symmetric(matrix: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Natural modes of a second-order system: frequencies, damping ratios, shapes."""
+"""Undamped modes of a second-order system: frequencies, shapes, modal damping ratios."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from twin._checks import InputError, is_concrete, require_x64
-from twin._eigen import generalised_eigh, guarded_root
 from twin.linear import SecondOrder
+from twin.modal._eigen import generalised_eigh, guarded_root
 
 
 class Modes(eqx.Module):

@@ -1,0 +1,10 @@
+"""Modes of second-order systems: undamped and damped, tracked along a path, and what moves their frequencies."""
+
+from twin.modal.damped import DampedModes as DampedModes
+from twin.modal.damped import damped_modes as damped_modes
+from twin.modal.elasticities import Elasticities as Elasticities
+from twin.modal.elasticities import elasticities as elasticities
+from twin.modal.tracking import likeness as likeness
+from twin.modal.tracking import track as track
+from twin.modal.undamped import Modes as Modes
+from twin.modal.undamped import modes as modes

@@ -85,14 +85,15 @@ class BallScrewAxis(AbstractPlant):
         return travel_per_radian(self.lead)
 
     def initial_state(self) -> BallScrewState:
-        return BallScrewState(*[jnp.zeros(())] * 13, self.friction.initial_state())
+        o = jnp.zeros(())
+        return BallScrewState(o, o, o, o, o, o, o, o, o, o, o, o, o, self.friction.initial_state())
 
     def rest_inputs(self) -> DriveInputs:
         return no_inputs()
 
     def vector_field(self, t: Float[Array, ""], state: Any, inputs: Any) -> BallScrewState:
         s, h, screw = state, self.travel_per_radian, self.springs.screw
-        k = self.springs.in_series(self._distance(s.slide_displacement))
+        k = self.springs.in_series(self.nut_position + (s.slide_displacement if self.follow_nut else 0.0))
         b = self.damping.coefficients(k)
         torsion = k.torsion * (s.end_angle - s.screw_angle)
         stretch = k.support * s.screw_displacement
@@ -104,10 +105,8 @@ class BallScrewAxis(AbstractPlant):
         f0 = stretch + b.support * s.screw_velocity
         fu = k.nut * nut + b.nut * nut_rate  # eq. 12
         f23 = k.flange * (s.nut_displacement - s.slide_displacement) + b.flange * (s.nut_velocity - s.slide_velocity)
-        if self.follow_nut:
-            pull = 0.5 * (stretch**2 / screw.axial_rigidity + torsion**2 / screw.torsional_rigidity)
-        else:
-            pull = 0.0
+        pull = 0.5 * (stretch**2 / screw.axial_rigidity + torsion**2 / screw.torsional_rigidity)
+        pull = pull if self.follow_nut else 0.0
         friction = self.friction.force(s.friction, s.screw_speed, s.screw_angle)
         return BallScrewState(
             s.motor_speed,
@@ -213,13 +212,6 @@ class BallScrewAxis(AbstractPlant):
         rotating = self.motor_inertia + self.end_inertia + self.screw_inertia
         inertia = rotating + self.travel_per_radian**2 * (self.nut_mass + self.slide_mass)
         return RigidScrewAxis(self.motor, inertia, self.lead, self.friction)
-
-    def _distance(self, slide: Float[Array, ""]) -> Float[Array, ""]:
-        """Distance of the nut from the fixed bearing; NaN once it is off the screw [m]."""
-        if not self.follow_nut:
-            return self.nut_position
-        distance = self.nut_position + slide
-        return jnp.where((distance > 0) & (distance <= self.springs.screw.length), distance, jnp.nan)
 
 
 def _check_nut(position: ArrayLike, length: ArrayLike) -> None:

@@ -1,6 +1,7 @@
 """A motor by the equations of a direct-current motor, which also describe a brushless one in its torque axis."""
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from twin._checks import as_scalar, positive
@@ -57,4 +58,4 @@ class DcMotor(eqx.Module):
         Returns:
             di/dt [A/s].
         """
-        return (voltage - self.resistance * current - self.back_emf * speed) / self.inductance
+        return jnp.asarray(voltage - self.resistance * current - self.back_emf * speed) / self.inductance

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from twin._checks import as_scalar, positive
@@ -26,6 +27,8 @@ class PerSpring(NamedTuple):
 class ScrewShaft(eqx.Module):
     """The screw's shaft, loaded between its fixed bearing and the nut: stiffness falls with the nut's distance.
 
+    A nut beyond either end gives NaN, so that a run in which it leaves the screw is marked as failed.
+
     Raises:
         InputError: a value that is not positive and finite.
     """
@@ -48,7 +51,7 @@ class ScrewShaft(eqx.Module):
         Args:
             distance: of the nut from the fixed bearing l [m].
         """
-        return self.axial_rigidity / distance
+        return self.axial_rigidity / self._on_screw(distance)
 
     def torsional_stiffness(self, distance: Float[ArrayLike, "*batch"]) -> Float[Array, "*batch"]:
         """Torsional stiffness k_BS^T = G·I_p/l of the loaded part [Nm/rad].
@@ -56,7 +59,11 @@ class ScrewShaft(eqx.Module):
         Args:
             distance: of the nut from the fixed bearing l [m].
         """
-        return self.torsional_rigidity / distance
+        return self.torsional_rigidity / self._on_screw(distance)
+
+    def _on_screw(self, distance: Float[ArrayLike, "*batch"]) -> Float[Array, "*batch"]:
+        distance = jnp.asarray(distance)
+        return jnp.where((distance > 0) & (distance <= self.length), distance, jnp.nan)
 
 
 class ScrewSprings(eqx.Module):

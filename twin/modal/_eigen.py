@@ -22,7 +22,8 @@ def generalised_eigh(
 
     First derivatives are exact for distinct eigenvalues and their vectors, and at a repeated eigenvalue for whatever
     does not depend on the choice of vectors in its subspace: the mean of the repeated eigenvalues, the projector on the
-    subspace, symmetric functions of both. Second derivatives are exact for distinct eigenvalues.
+    subspace, symmetric functions of both. Second derivatives are exact for distinct eigenvalues, and for the mean of
+    repeated ones.
 
     Args:
         stiffness: K, symmetric.
@@ -52,7 +53,9 @@ def _generalised_eigh_jvp(primals: tuple, tangents: tuple) -> tuple[tuple, tuple
     gap = jnp.where(together, 1.0, values[None, :] - values[:, None])
     # Between the vectors of one subspace only the normalisation acts: half of dM, shared evenly.
     turn = jnp.where(together, -0.5 * d_m, (d_k - d_m * values[None, :]) / gap)
-    return (values, vectors), (jnp.diagonal(d_k) - values * jnp.diagonal(d_m), vectors @ turn)
+    # ΦᵀKΦ is diag(λ), but its derivative is full in a repeated subspace, which second derivatives need.
+    own = vectors.T @ stiffness @ vectors
+    return (values, vectors), (jnp.diagonal(d_k) - jnp.sum(d_m * own, axis=0), vectors @ turn)
 
 
 def repeated(values: Float[Array, "n"]) -> Array:

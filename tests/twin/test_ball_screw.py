@@ -11,7 +11,7 @@ from twin._checks import InputError
 from twin.drives import BallScrewState, DriveInputs, SpringDampers, StructuralDamping, mauro_axis
 from twin.laws import LuGreFriction, ViscousFriction
 from twin.linear import frequency_response, linearise
-from twin.paths import set_leaves
+from twin.paths import get_leaf, set_leaves
 from twin.references import SampledSignal
 from twin.simulation import simulate
 from twin.stepping import AdaptiveSteps, ConstantSteps
@@ -130,6 +130,24 @@ def test_rigid_and_elastic_axis_run_alike():
     assert np.allclose(elastic.outputs.power, rigid.outputs.power, atol=60.0)
     assert np.allclose(elastic.outputs.torque, 1.5 * elastic.outputs.current, rtol=1e-14)
     assert np.allclose(elastic.outputs.power, elastic.outputs.voltage * elastic.outputs.current, rtol=1e-14)
+
+
+def test_sensitivities_of_a_run():
+    """The travel's derivative with respect to a mass, a stiffness and the lead, against differences."""
+    axis, paths = mauro_axis(), ("slide_mass", "springs.support", "lead")
+    nominal = jnp.stack([get_leaf(axis, path) for path in paths])
+    volts = SampledSignal(np.array([0.0, 0.01, 0.05]), DriveInputs(np.array([0.0, 60.0, 60.0]), np.zeros(3)))
+
+    def travel(factors):
+        changed = set_leaves(axis, dict(zip(paths, nominal * factors, strict=True)))
+        run = simulate(changed, volts, np.linspace(0.0, 0.05, 26), stepping=ConstantSteps(40))
+        return run.outputs.position[-1]
+
+    slopes = jax.jit(jax.jacfwd(travel))(jnp.ones(3))
+    compiled, h = jax.jit(travel), 1e-4
+    for i, slope in enumerate(slopes):
+        step = h * jnp.zeros(3).at[i].set(1.0)
+        assert np.isclose(slope, (compiled(1 + step) - compiled(1 - step)) / (2 * h), rtol=1e-5, atol=1e-12)
 
 
 @pytest.mark.parametrize("elastic", [True, False])

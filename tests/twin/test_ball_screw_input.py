@@ -118,6 +118,12 @@ def test_a_bad_sample_of_a_batch_is_marked():
     found = jax.jit(jax.vmap(first))(jnp.array([200.0, -200.0, 300.0]))
     assert np.array_equal(np.isnan(found), [False, True, False])
 
+    def beyond(distance):
+        return modes(axis.second_order(distance)).frequency[1]
+
+    found = jax.jit(jax.vmap(beyond))(jnp.array([-0.1, 0.75, 1.6]))
+    assert np.array_equal(np.isnan(found), [True, False, True])
+
 
 def test_left_hand_screw_mirrors_the_motion_and_keeps_the_modes():
     axis = mauro_axis()

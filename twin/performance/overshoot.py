@@ -42,7 +42,7 @@ def overshoot(
     beyond = (x - end) / (end - begin)
     if width is not None:
         positive("width", width)
-        return width * jax.nn.logsumexp(jnp.append(beyond, 0.0) / width)
+        return jnp.asarray(width) * jax.nn.logsumexp(jnp.append(beyond, 0.0) / width)
     peak = jnp.max(beyond) if t.size < 3 else _peak(t, beyond)
     return jnp.where(peak > 0, peak, jnp.where(jnp.isnan(peak), jnp.nan, 0.0))
 

@@ -98,7 +98,8 @@ def test_derivatives_match_central_differences(name, velocity):
 @given(velocity=st.floats(-2.0, 2.0))
 @settings(max_examples=30, deadline=None)
 def test_never_drives(name, velocity):
-    assert velocity * float(_force(LAWS[name], jnp.array(velocity))) >= 0
+    # A table's force at zero speed is zero but for the rounding of its polynomial.
+    assert np.sign(velocity) * float(_force(LAWS[name], jnp.array(velocity))) >= -1e-13
 
 
 @pytest.mark.parametrize("name", SYMMETRIC)

@@ -19,6 +19,12 @@ def _evaluate(forces, velocity):
     return TabulatedFriction(jnp.asarray(X), forces)(velocity)
 
 
+@jax.jit
+def _at(speeds, forces, velocity):
+    return TabulatedFriction(speeds, jnp.asarray(forces))(velocity)
+
+
+_BY_SPEEDS = jax.jit(jax.jacfwd(_at, argnums=0))
 _BY_FORCES = jax.jit(jax.jacfwd(_evaluate, argnums=0))
 _BY_FORCES_REVERSE = jax.jit(jax.jacrev(_evaluate, argnums=0))
 
@@ -47,7 +53,7 @@ def test_passes_through_its_points_and_goes_on_straight():
     def law(velocity):
         return _evaluate(forces, velocity)
 
-    np.testing.assert_array_equal(law(X), forces)
+    np.testing.assert_allclose(law(X), forces, rtol=1e-14, atol=1e-14)
     slope = jax.jit(jax.vmap(jax.grad(law)))
     first, last = slope(jnp.array([X[0], X[-1]]))
     outside = np.array([X[0] - 2.0, X[-1] + 3.0])
@@ -71,6 +77,28 @@ def test_derivatives_with_respect_to_the_forces(velocity):
         assert derivative[k] == pytest.approx(float(up - down) / 2e-5, rel=1e-6, abs=1e-8)
     # Raising the whole table raises the curve.
     assert float(jnp.sum(derivative)) == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("velocity", [-1.7, -0.2, 0.02, 0.7, 2.0])
+@pytest.mark.parametrize(
+    "forces", [[-9.0, -5.0, -6.0, 0.0, 4.0, 3.0, 9.0, 10.0], [-9.0, -5.0, -5.0, 0.0, 4.0, 4.0, 9.0, 10.0]]
+)
+def test_derivatives_with_respect_to_the_speeds(velocity, forces):
+    """Of the motion and of the table, also beside chords of zero."""
+    exact = _BY_SPEEDS(jnp.asarray(X), jnp.asarray(forces), jnp.asarray(velocity))
+    numeric = [
+        (_at(X + step, forces, velocity) - _at(X - step, forces, velocity)) / 2e-6 for step in 1e-6 * np.eye(X.size)
+    ]
+    np.testing.assert_allclose(exact, numeric, rtol=1e-5, atol=1e-6)
+    # Shifting the whole table is shifting the motion the other way.
+    slope = _at(X, forces, velocity + 1e-6) - _at(X, forces, velocity - 1e-6)
+    assert float(jnp.sum(exact)) == pytest.approx(-float(slope) / 2e-6, rel=1e-5, abs=1e-6)
+
+
+def test_maps_over_tables():
+    forces = np.stack([X, 2 * X, X**3, np.zeros(X.size)])
+    together = jax.vmap(_evaluate, (0, None))(jnp.asarray(forces), jnp.asarray(X))
+    np.testing.assert_allclose(together, forces, rtol=1e-13, atol=1e-14)
 
 
 @pytest.mark.parametrize("forces", [np.zeros(X.size), np.repeat([1.0, 2.0], 4), np.tile([1.0, -1.0], 4)])

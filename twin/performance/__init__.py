@@ -1,0 +1,22 @@
+"""How well a drive positions: energy, time, error, overshoot, their weighing, and the stability of its loop."""
+
+from twin.performance.energy import motoring_energy
+from twin.performance.overshoot import overshoot
+from twin.performance.positioning import PositioningPerformance, positioning_cost, positioning_performance
+from twin.performance.response_time import response_time, settling_time
+from twin.performance.stability import StabilityMargin, stability_margin
+from twin.performance.static_error import StaticError, static_error
+
+__all__ = [
+    "PositioningPerformance",
+    "StabilityMargin",
+    "StaticError",
+    "motoring_energy",
+    "overshoot",
+    "positioning_cost",
+    "positioning_performance",
+    "response_time",
+    "settling_time",
+    "stability_margin",
+    "static_error",
+]

@@ -92,9 +92,9 @@ def smooth_clip(
         The limited value in the shape of v.
     """
     v = jnp.asarray(value)
-    width = 1e-3 * limit if width is None else width
+    bend = jnp.asarray(1e-3 * limit if width is None else width)
     # The difference of the two roots without cancellation.
-    return jnp.asarray(2 * limit * v) / (smooth_abs(v + limit, width) + smooth_abs(v - limit, width))
+    return jnp.asarray(2 * limit * v) / (smooth_abs(v + limit, bend) + smooth_abs(v - limit, bend))
 
 
 def _guarded(value: ArrayLike, width: ArrayLike) -> tuple[Array, Array, Array]:

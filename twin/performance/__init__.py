@@ -1,5 +1,6 @@
 """How well a drive positions: energy, time, error, overshoot, their weighing, and the stability of its loop."""
 
+from twin.performance.cycle import PositioningCycle, cycle_performance
 from twin.performance.energy import motoring_energy
 from twin.performance.overshoot import overshoot
 from twin.performance.positioning import PositioningPerformance, positioning_cost, positioning_performance
@@ -8,9 +9,11 @@ from twin.performance.stability import StabilityMargin, stability_margin
 from twin.performance.static_error import StaticError, static_error
 
 __all__ = [
+    "PositioningCycle",
     "PositioningPerformance",
     "StabilityMargin",
     "StaticError",
+    "cycle_performance",
     "motoring_energy",
     "overshoot",
     "positioning_cost",

@@ -1,0 +1,99 @@
+"""One positioning of a controlled axis: the move it is told to make, and how well it makes it."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Float
+
+from twin._checks import InputError, as_array, as_scalar, increasing, positive
+from twin.control.closed_loop import ClosedLoop
+from twin.performance.energy import motoring_energy
+from twin.performance.positioning import PositioningPerformance
+from twin.performance.response_time import response_time
+from twin.performance.static_error import static_error
+from twin.references import JerkLimitedMove
+from twin.simulation import simulate
+from twin.stepping import AbstractStepping, ConstantSteps
+from twin.trajectory import Trajectory
+
+
+class PositioningCycle(eqx.Module):
+    """A move of a controlled axis from rest to rest, followed by a dwell in which it comes to a standstill.
+
+    Everything in it can be varied by path, `loop.controller.position_gain` or `move.jerk_limit` say, by `sweep`, by a
+    fit or by a design.
+
+    Raises:
+        InputError: times that do not increase, or do not cover the move and the window after it, or a window that is
+            not positive.
+
+    Source: the reference cycle of Mauro et al., sections 6 and 7.
+    """
+
+    loop: ClosedLoop
+    """Axis and controller; the axis gives `position`, `velocity` and electrical `power`."""
+    move: JerkLimitedMove
+    """What the axis is told to do."""
+    times: Float[Array, " times"] = eqx.field(converter=as_array)
+    """Times at which the run is recorded [s]; they do not move with the move."""
+    stepping: AbstractStepping
+    """How time is stepped between them."""
+    window: Float[Array, ""] = eqx.field(converter=as_scalar, default=0.02)
+    """Time at the end over which the static error is averaged [s]."""
+
+    def __check_init__(self):
+        increasing("times of the cycle", self.times, "s")
+        positive("window of the cycle", self.window, "s")
+
+    @staticmethod
+    def create(
+        loop: ClosedLoop, move: JerkLimitedMove, *, dwell: float, step: float = 5e-5, record: float = 2e-3
+    ) -> "PositioningCycle":
+        """A cycle with constant steps.
+
+        Args:
+            loop: axis and controller.
+            move: what the axis is told to do.
+            dwell: time after the move, in which the axis comes to a standstill [s].
+            step: length of the integration steps [s].
+            record: time between recorded samples, a multiple of the step [s].
+
+        Raises:
+            InputError: a time that is not positive, or a record that is no multiple of the step.
+        """
+        for name, value in (("dwell", dwell), ("step", step), ("record", record)):
+            positive(name, value, "s")
+        substeps = round(record / step)
+        if substeps < 1 or abs(substeps * step - record) > 1e-9 * record:
+            raise InputError(f"record must be a multiple of the step of {step:g} s, but is {record:g} s. Round it.")
+        samples = int(jnp.ceil((move.start_time + move.duration() + dwell) / record)) + 1
+        return PositioningCycle(loop, move, record * jnp.arange(samples), ConstantSteps(substeps=substeps))
+
+    @property
+    def target(self) -> Float[Array, ""]:
+        """Where the move ends [m]."""
+        return self.move.start_position + self.move.distance
+
+    def simulate(self) -> Trajectory:
+        """The run of one cycle."""
+        return simulate(self.loop, self.move, self.times, stepping=self.stepping)
+
+
+def cycle_performance(cycle: PositioningCycle, share: Float[ArrayLike, ""] = 0.99) -> PositioningPerformance:
+    """Static error, motoring energy and response time of a cycle.
+
+    Args:
+        cycle: the cycle.
+        share: share of the travel that ends the response time [-].
+
+    Returns:
+        The three measures; NaN where the simulation failed or the share is never reached.
+    """
+    run = cycle.simulate()
+    position, velocity = run.channel("position"), run.channel("velocity")
+    return PositioningPerformance(
+        static_error(run.times, position, cycle.target, cycle.window).signed,
+        motoring_energy(run.times, run.channel("power")),
+        response_time(
+            run.times, position, cycle.target, start=cycle.move.start_position, share=share, velocity=velocity
+        ),
+    )

@@ -15,9 +15,9 @@ FIRST_FREQUENCY = 152.0
 DAMPING_RATIO = 0.03
 """Damping ratio of that mode [-]; section 5."""
 
-LEAD = 0.02
+LEAD = 0.01
 """Chosen: lead [m]."""
-SHAFT_DIAMETER = 0.045
+SHAFT_DIAMETER = 0.05
 """Chosen: root diameter of the screw [m]."""
 LENGTH = 1.5
 """Chosen: length of the screw [m]."""
@@ -27,9 +27,9 @@ HALF_STROKE = 0.5
 """Chosen: travel of the slide to either side of mid-stroke [m]."""
 END = (0.03, 0.12)
 """Chosen: diameter and length of the screw's end journal [m]."""
-MOTOR = (0.35, 4e-3, 1.5, 1.5)
-"""Chosen: resistance [Ohm], inductance [H], back EMF [Vs/rad] and torque constant [Nm/A], as of a 20 Nm servo motor."""
-MOTOR_INERTIA = 3e-3
+MOTOR = (1.3, 0.01, 0.56, 0.56)
+"""Chosen: resistance [Ohm], inductance [H], back EMF [Vs/rad] and torque constant [Nm/A], such that Table 1 can be met."""
+MOTOR_INERTIA = 0.0125
 """Chosen: inertia of the rotor [kg m²]."""
 MOTOR_SHAFT = 6e4
 """Chosen: torsional stiffness of the motor's shaft [Nm/rad]."""
@@ -37,7 +37,7 @@ COUPLING = (5e4, 6e-4)
 """Chosen: torsional stiffness [Nm/rad] and inertia [kg m²] of the coupling."""
 BEARING = 3e9
 """Chosen: axial stiffness of the roller pack [N/m]."""
-SUPPORT = 4.0507e8
+SUPPORT = 5.3426e8
 """Chosen: axial stiffness of the metal support [N/m]; set so that the first frequency is the published one."""
 NUT = 1.5e9
 """Chosen: axial stiffness of the preloaded nut [N/m]."""

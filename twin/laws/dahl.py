@@ -21,12 +21,14 @@ class DahlState(NamedTuple):
 
 
 class DahlFriction(AbstractFriction):
-    """F = z·(F_c + F_1·(1 - exp(-|v|/v_1)) + F_v·|v| + ΔF(x)) + z²·F_a·|v|,  dz/dt = (u - |u|·z)/δ.
+    """F = z·(F_c + F_1·(1 - exp(-|v|/v_1)) + F_v·|v| + ΔF(x)) + z²·F_a·|v| + σ_1·δ·dz/dt,  dz/dt = (u - |u|·z)/δ.
 
     z follows the direction of motion over the displacement δ: balls of a screw or guide roll a few micrometres before
     they slide. It takes the place of sgn(v), so that friction has hysteresis instead of a jump. The sliding level
     starts at F_c and rises by F_1 over the speed v_1, as lubricant is drawn in and sheared; the viscous coefficient is
     F_v + F_a in positive and F_v - F_a in negative direction. ΔF(x) is a change of the sliding level along the travel.
+    The contact's damping σ_1 acts while z turns, as the micro-damping of LuGre friction does; without it an axis that
+    is held by friction rings for long.
 
     u = v/√(1 + (v/ρδ)²) is the speed, limited to ρ·δ: above it z has long arrived, and the limit keeps z from moving
     faster than the rate ρ, so that neither fast motion nor a small δ makes the equations stiff.
@@ -54,6 +56,8 @@ class DahlFriction(AbstractFriction):
     """Largest rate of z, ρ [1/s]; about twice what sampling and integration steps can resolve."""
     width: Float[Array, ""] = eqx.field(converter=as_scalar, default=1e-5)
     """Speed over which |v| is rounded off [m/s or rad/s]; sets the creep under load at rest."""
+    damping: Float[Array, ""] = eqx.field(converter=as_scalar, default=0.0)
+    """Damping of the contact while it turns σ_1 [Ns/m or Nms/rad]."""
     variation: AbstractPositionForce = eqx.field(default_factory=NoForce)
     """Change of the sliding level along the travel ΔF(x) [N or Nm], against motion in either direction."""
     initial_direction: Float[Array, ""] = eqx.field(converter=as_scalar, default=0.0)
@@ -68,6 +72,7 @@ class DahlFriction(AbstractFriction):
         positive("rise_velocity", self.rise_velocity, "m/s")
         positive("rate_limit", self.rate_limit, "1/s")
         positive("width", self.width, "m/s")
+        not_negative("damping", self.damping, "Ns/m")
         finite("initial_direction", self.initial_direction)
         start = self.initial_direction
         if is_concrete(start) and isinstance(start, jax.Array) and abs(float(start)) > 1:
@@ -85,7 +90,8 @@ class DahlFriction(AbstractFriction):
     ) -> Float[Array, "*batch"]:
         z = state.direction
         speed = smooth_abs(velocity, self.width)
-        return z * (self.level(speed) + self.variation(position)) + z**2 * self.asymmetry * speed
+        turning = self.damping * self.displacement * self.rate(state, velocity).direction
+        return z * (self.level(speed) + self.variation(position)) + z**2 * self.asymmetry * speed + turning
 
     def level(self, speed: Float[ArrayLike, "*batch"]) -> Float[Array, "*batch"]:
         """Sliding level, the mean of both directions, where nothing varies along the travel [N or Nm].

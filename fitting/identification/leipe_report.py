@@ -1,15 +1,13 @@
 """Report on the reproduction of Leipe et al.: numbers, parameters and pictures in a folder, main numbers as text."""
 
-import json
 import time
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from fitting.identification.leipe import fit_printed_curves, study_direct, study_sweeps, validate
 from fitting.identification.leipe_plots import draw_all
 from fitting.identification.leipe_summary import summarise
+from fitting.json_file import write_json
 from fitting.result import FitResult
 from twin.io.parameter_file import ParameterEntry, write_parameters
 
@@ -33,20 +31,10 @@ def reproduce_leipe(out: Path) -> dict[str, Any]:
     validation = validate(direct)
     summary = summarise(curves, sweeps, direct, validation)
     summary["seconds"] = time.perf_counter() - clock
-    text = json.dumps(_without_nan(summary), indent=2, allow_nan=False)
-    (out / "summary.json").write_text(text + "\n", encoding="utf-8")
+    write_json(out / "summary.json", summary)
     write_parameters(out / "parameters.toml", _entries(direct.fits.joint) + _entries(validation.motors))
     draw_all(out, curves, sweeps, direct, validation)
     return summary
-
-
-def _without_nan(value: Any) -> Any:
-    """What JSON can hold: numbers that are not finite become null."""
-    if isinstance(value, dict):
-        return {key: _without_nan(entry) for key, entry in value.items()}
-    if isinstance(value, list):
-        return [_without_nan(entry) for entry in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def tabulate(summary: dict[str, Any]) -> str:

@@ -6,7 +6,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from twin._checks import as_scalar, positive
 from twin.control import ClosedLoop, PositionVelocityPI
-from twin.drives import BallScrewAxis
+from twin.drives import BallScrewAxis, mauro_axis
 from twin.drives.dc_motor import DcMotor
 from twin.laws import DahlFriction
 from twin.parameters import Parameter, ParameterSpace
@@ -141,4 +141,31 @@ def table_space() -> ParameterSpace:
     )
     return ParameterSpace(
         [Parameter(path, unit, lower, upper, scale=scale) for path, unit, lower, upper, scale in rows]
+    )
+
+
+def table_start() -> TableTwin:
+    """Where the fit to Table 1 starts: chosen values, the best of a search over some dozens of random starts.
+
+    The problem has many local minima, as an axis that stops a little earlier or later is held by friction elsewhere.
+    """
+    return TableTwin(
+        axis=mauro_axis(),
+        slide_mass=200.0,
+        motor_inertia=6.09e-3,
+        torque_constant=0.514,
+        resistance=1.683,
+        inductance=0.01743,
+        breakaway=4.146,
+        sliding=0.05,
+        sliding_speed=127.2,
+        viscous=1e-4,
+        velocity_gain=2.39,
+        integral_gain=0.01653,
+        feedforward=0.0,
+        voltage_limit=251.4,
+        distance=0.9177,
+        velocity=0.752,
+        acceleration=13.27,
+        jerk=103.5,
     )

@@ -1,0 +1,125 @@
+"""Table 1 of Mauro et al. repeated by a twin that is fitted to it: section 7, eq. 22, fig. 11."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from fitting.fit import fit
+from fitting.identifiability import IdentifiabilityReport, identifiability
+from fitting.identification.mauro_residual import TableResidual
+from fitting.identification.mauro_table import MauroTable, mauro_table
+from fitting.identification.mauro_twin import TableTwin, table_space, table_start
+from fitting.result import FitResult
+from twin.performance import PositioningPerformance, positioning_cost
+
+# Steps of the fit, and those that it is finished and judged with [s].
+_COARSE, _FINE = 2e-4, 5e-5
+
+
+class TableStudy(NamedTuple):
+    """The twin behind Table 1 and how it was judged."""
+
+    fit: FitResult
+    """The fit, with fine steps."""
+    seen: IdentifiabilityReport
+    """Which values the table determines."""
+    rows: PositioningPerformance
+    """Error with its sign, energy and time of the 20 rows, one inertia [m, J, s]."""
+    cost: np.ndarray
+    """Eq. 22 of these rows."""
+    six_degrees: PositioningPerformance
+    """The same rows with six degrees of freedom."""
+    half_step: PositioningPerformance
+    """The same rows with half the step."""
+    half_presliding: PositioningPerformance
+    """The same rows with friction that turns around over half the angle."""
+
+
+class PrintedCost(NamedTuple):
+    """Eq. 22 on Table 1's own columns."""
+
+    cost: np.ndarray
+    """Cost of the rows."""
+    largest_deviation: float
+    """From the printed cost."""
+    optimum: float
+    """Gain of the least cost [1/min]."""
+
+
+class ColumnErrors(NamedTuple):
+    """Root mean squares over the rows of what the twin deviates from the table."""
+
+    time: float
+    """Of the response time, relative."""
+    energy: float
+    """Of the energy, relative."""
+    error: float
+    """Of the magnitude of the static error [m]."""
+
+
+def study_cost() -> PrintedCost:
+    """Eq. 22 on Table 1's own columns."""
+    table = mauro_table()
+    cost = np.asarray(positioning_cost(table.error, table.energy, table.time))
+    return PrintedCost(cost, float(np.max(np.abs(cost - table.cost))), float(table.gain[np.argmin(cost)]))
+
+
+def study_table(start: TableTwin | None = None) -> TableStudy:
+    """Fit the twin to Table 1, with coarse steps and then with fine ones, and run it in other ways.
+
+    Args:
+        start: where the fit starts; chosen values if not given.
+    """
+    space = table_space()
+    coarse = fit(TableResidual.of(step=_COARSE), table_start() if start is None else start, space, max_steps=40)
+    result = fit(TableResidual.of(step=_FINE), coarse.model, space, max_steps=8)
+    rows = rows_of(result.model)
+    finer = eqx.tree_at(lambda twin: twin.presliding, result.model, result.model.presliding / 2)
+    return TableStudy(
+        fit=result,
+        seen=identifiability(result),
+        rows=rows,
+        cost=np.asarray(positioning_cost(*rows)),
+        six_degrees=rows_of(result.model, rigid=False),
+        half_step=rows_of(result.model, step=_FINE / 2),
+        half_presliding=rows_of(finer),
+    )
+
+
+def rows_of(twin: TableTwin, *, rigid: bool = True, step: float = _FINE) -> PositioningPerformance:
+    """The 20 rows of Table 1 as a twin has them, in one batch.
+
+    Args:
+        twin: the axis.
+        rigid: one inertia instead of six degrees of freedom.
+        step: length of the integration steps [s].
+    """
+    found = _performance(TableResidual.of(step=step, rigid=rigid), twin)
+    return PositioningPerformance(*(np.asarray(column) for column in found))
+
+
+def column_errors(rows: PositioningPerformance, table: MauroTable | None = None) -> ColumnErrors:
+    """How far the rows are from the table; time and energy of the row that repeats another do not count.
+
+    Args:
+        rows: as `rows_of` gives them.
+        table: Table 1 if not given.
+    """
+    table = mauro_table() if table is None else table
+    counted = np.asarray(TableResidual.of(table).counted) > 0
+    return ColumnErrors(
+        time=_rms((np.asarray(rows.time) / table.time - 1)[counted]),
+        energy=_rms((np.asarray(rows.energy) / (1e3 * table.energy) - 1)[counted]),
+        error=_rms(np.abs(np.asarray(rows.error)) - 1e-6 * table.error),
+    )
+
+
+@eqx.filter_jit
+def _performance(residual: TableResidual, twin: TableTwin) -> PositioningPerformance:
+    return residual.performance(twin)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(jnp.sqrt(jnp.mean(values**2)))

@@ -4,6 +4,8 @@ At rest a sharp friction blocks an axis, and its slope there is nothing but the 
 model is therefore one of an axis that moves, or of one whose friction is left to its viscous part.
 """
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -12,7 +14,7 @@ from jaxtyping import Array, ArrayLike, Float
 from twin._checks import InputError, as_scalar
 from twin.control.closed_loop import ClosedLoop
 from twin.drives.friction_slope import friction_slope
-from twin.laws import AbstractFriction, AbstractStaticFriction
+from twin.laws import AbstractFriction, AbstractStaticFriction, ViscousFriction
 
 
 class FrictionSlope(AbstractStaticFriction):
@@ -36,10 +38,7 @@ def with_friction_at(loop: ClosedLoop, speed: Float[ArrayLike, ""]) -> ClosedLoo
         InputError: several friction laws, or one with memory.
     """
 
-    def is_law(x: object) -> bool:
-        return isinstance(x, AbstractFriction)
-
-    laws = [law for law in jax.tree.leaves(loop.plant, is_leaf=is_law) if is_law(law)]
+    laws = _laws(loop)
     if not laws:
         return loop
     if len(laws) > 1:
@@ -48,5 +47,36 @@ def with_friction_at(loop: ClosedLoop, speed: Float[ArrayLike, ""]) -> ClosedLoo
             "speed does not describe. Replace each by a FrictionSlope, or give the operating state instead of a speed."
         )
     straight = FrictionSlope(friction_slope("friction of the plant", laws[0], speed))
-    plant = jax.tree.map(lambda x: straight if is_law(x) else x, loop.plant, is_leaf=is_law)
+    plant = jax.tree.map(lambda x: straight if _is_law(x) else x, loop.plant, is_leaf=_is_law)
     return ClosedLoop(plant, loop.controller)
+
+
+def at_operating_point(loop: ClosedLoop, speed: Float[ArrayLike, ""] | None, state: Any) -> ClosedLoop:
+    """The loop as it is linearised: with the friction of a speed, or with its own at a state.
+
+    Args:
+        loop: plant and controller.
+        speed: operating speed [m/s or rad/s], or None.
+        state: operating state, or None.
+
+    Raises:
+        InputError: neither, and a friction whose slope depends on the speed; otherwise as `with_friction_at`.
+    """
+    if speed is not None:
+        return with_friction_at(loop, speed)
+    curved = [law for law in _laws(loop) if not isinstance(law, FrictionSlope | ViscousFriction)]
+    if curved and state is None:
+        raise InputError(
+            f"The plant's friction is a {type(curved[0]).__name__}, whose slope depends on the speed, and no operating "
+            "point is given. Give friction_speed, a speed at which the axis moves; or state, which is "
+            "loop.initial_state() for an axis at rest, where a sharp friction blocks it."
+        )
+    return loop
+
+
+def _laws(loop: ClosedLoop) -> list[AbstractFriction]:
+    return [law for law in jax.tree.leaves(loop.plant, is_leaf=_is_law) if _is_law(law)]
+
+
+def _is_law(x: object) -> bool:
+    return isinstance(x, AbstractFriction)

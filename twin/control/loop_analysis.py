@@ -8,7 +8,7 @@ from jaxtyping import Array, ArrayLike, Complex, Float, PyTree
 
 from twin._checks import InputError, is_concrete, require_x64
 from twin.control.closed_loop import ClosedLoop, ClosedLoopState
-from twin.control.friction_at_speed import with_friction_at
+from twin.control.friction_at_speed import at_operating_point
 from twin.frf import FRF
 from twin.linear import StateSpace, frequency_response, linearise
 from twin.plant import AbstractPlant
@@ -31,7 +31,7 @@ class ClosedLoopPoles(NamedTuple):
 
 def closed_loop_response(
     loop: ClosedLoop,
-    frequency: Float[ArrayLike, "frequencies"],
+    frequency: Float[ArrayLike, "..."],
     *,
     output: str = "position",
     friction_speed: Float[ArrayLike, ""] | None = None,
@@ -45,19 +45,20 @@ def closed_loop_response(
 
     Args:
         loop: plant and controller.
-        frequency: frequencies [Hz].
+        frequency: frequencies [Hz], a vector.
         output: output of the plant that responds; the position for the usual picture.
         friction_speed: operating speed at which the friction is taken for a straight line [rad/s for a screw, m/s for a
-            linear law]; without it friction is linearised at the state, and one that is sharp at rest blocks the axis.
-        state: operating point; at rest in the middle if not given.
+            linear law]; needed, or else the state, where friction is curved.
+        state: operating point; friction has the slope that it has there, and one that is sharp blocks an axis at rest.
+            `initial_state()`, at rest in the middle, if not given.
         reference: operating reference, which keeps the state; at zero if not given.
 
     Returns:
         The response to "reference" [output unit per m or rad of set position].
 
     Raises:
-        InputError: 64-bit mode off, frequencies not a vector, an unknown output, several friction laws or one with
-            memory together with `friction_speed`.
+        InputError: 64-bit mode off, frequencies not a vector, an unknown output, a curved friction without an operating
+            point, several friction laws or one with memory together with `friction_speed`.
 
     Source: Mauro, Pastorelli, Mohtar (2014), Fig. 7.
     """
@@ -71,7 +72,7 @@ def closed_loop_response(
 
 def open_loop_response(
     loop: ClosedLoop,
-    frequency: Float[ArrayLike, "frequencies"],
+    frequency: Float[ArrayLike, "..."],
     *,
     at: str = "command",
     friction_speed: Float[ArrayLike, ""] | None = None,
@@ -86,7 +87,7 @@ def open_loop_response(
 
     Args:
         loop: plant and controller.
-        frequency: frequencies [Hz].
+        frequency: frequencies [Hz], a vector.
         at: "command" for what the actuator is told (the motor's voltage), or a measured signal that the controller
             feeds back: with `PositionVelocityPI` "motor_angle" or "position", as its `feedback` says, or "motor_speed".
         friction_speed: as in `closed_loop_response`.
@@ -99,8 +100,7 @@ def open_loop_response(
     Raises:
         InputError: as `closed_loop_response`; several commands, a signal that the controller does not feed back.
     """
-    if friction_speed is not None:
-        loop = with_friction_at(loop, friction_speed)
+    loop = at_operating_point(loop, friction_speed, state)
     held = loop.rest_inputs() if reference is None else reference
     start = loop.initial_state() if state is None else state
     if at == "command" and len(jax.tree.leaves(loop.plant.rest_inputs().command)) > 1:
@@ -162,8 +162,7 @@ def _linear(
     state: ClosedLoopState | None,
     reference: MotionPoint | None,
 ) -> StateSpace:
-    if friction_speed is not None:
-        loop = with_friction_at(loop, friction_speed)
+    loop = at_operating_point(loop, friction_speed, state)
     return linearise(loop, state, reference, outputs=outputs or loop_outputs(loop)[:1])
 
 

@@ -8,7 +8,7 @@ from jaxtyping import ArrayLike, Complex, Float
 
 from twin._checks import InputError
 from twin.control.closed_loop import ClosedLoop, ClosedLoopState
-from twin.control.friction_at_speed import with_friction_at
+from twin.control.friction_at_speed import at_operating_point
 from twin.control.loop_analysis import loop_outputs, poles_of
 from twin.linear import StateSpace, linearise
 from twin.references import MotionPoint
@@ -43,16 +43,15 @@ def check_stability(
 
     Args:
         loop: plant and controller with known values, not traced; in a batch use `closed_loop_poles`.
-        friction_speed: operating speed at which the friction is taken for a straight line [rad/s or m/s].
-        state: operating point; at rest in the middle if not given.
-        reference: operating reference; at zero if not given.
+        friction_speed: as in `closed_loop_response`.
+        state: as in `closed_loop_response`.
+        reference: as in `closed_loop_response`.
 
     Raises:
-        InputError: 64-bit mode off, values that are not finite, several friction laws or one with memory together with
-            `friction_speed`.
+        InputError: 64-bit mode off, values that are not finite, a curved friction without an operating point, several
+            friction laws or one with memory together with `friction_speed`.
     """
-    if friction_speed is not None:
-        loop = with_friction_at(loop, friction_speed)
+    loop = at_operating_point(loop, friction_speed, state)
     system = _system(loop, state, reference)
     if not np.all(np.isfinite(np.asarray(system.a))):
         raise InputError(
@@ -61,8 +60,8 @@ def check_stability(
         )
     poles = np.asarray(poles_of(system).poles)
     controlled = bool(np.any(np.asarray(system.b)[:, system.inputs.index("position")] != 0))
-    growing = poles[(poles.real > _STILL * np.max(np.abs(poles))) & (poles.imag >= 0)]
-    growing = growing[np.argsort(-growing.real)]
+    growing = poles[(np.real(poles) > _STILL * np.max(np.abs(poles))) & (np.imag(poles) >= 0)]
+    growing = growing[np.argsort(-np.real(growing))]
     if growing.size:
         return StabilityReport(False, poles, growing, _sentence(growing, loop, system, state, reference))
     drifting = poles[poles == 0]
@@ -71,12 +70,12 @@ def check_stability(
             False,
             poles,
             drifting,
-            "The position is not controlled: it stays wherever it is pushed (a pole at 0 Hz). Give the position and "
+            "The position is not controlled, it stays wherever it is pushed (a pole at 0 Hz): give the position and "
             "velocity controllers gains above zero.",
         )
     moving = poles[poles != 0]
-    slowest = moving[np.argmax(moving.real)]
-    return StabilityReport(True, poles, growing, f"The closed loop is stable; its slowest motion {_describe(slowest)}.")
+    last = moving[np.argmax(np.real(moving))]
+    return StabilityReport(True, poles, growing, f"The closed loop is stable; what dies out last {_describe(last)}.")
 
 
 def require_stable(
@@ -125,7 +124,7 @@ def _sentence(
 ) -> str:
     others = f" ({growing.size} such poles)" if growing.size > 1 else ""
     cure = _cure(growing[0], loop, system, state, reference)
-    return f"The closed loop is unstable{others}: what grows fastest {_describe(growing[0])}. {cure}"
+    return f"The closed loop is unstable{others}: what grows fastest {_describe(growing[0])}; {cure}."
 
 
 def _cure(
@@ -144,14 +143,14 @@ def _cure(
         return _system(ClosedLoop(loop.plant, jax.tree.unflatten(tree, changed)), state, reference).a
 
     if not chosen:
-        return "Lower the gains of the controller."
+        return "lower the gains of the controller"
     slopes = np.asarray(jax.jacfwd(matrix)(jnp.ones(len(chosen))))
     right, left = (_vector(a, pole) for a in (np.asarray(system.a), np.asarray(system.a).T))
     moves = np.real(np.einsum("i,ijk,j->k", left, slopes, right) / (left @ right))
     most = int(np.argmax(np.abs(moves)))
     if not np.isfinite(moves[most]) or moves[most] == 0:
-        return "Lower the gains of the controller."
-    return f"{'Lower' if moves[most] > 0 else 'Raise'} {named[chosen[most]]}, which moves this pole most."
+        return "lower the gains of the controller"
+    return f"{'lower' if moves[most] > 0 else 'raise'} {named[chosen[most]]}, which moves this pole most"
 
 
 def _vector(matrix: np.ndarray, pole: complex) -> np.ndarray:

@@ -67,9 +67,10 @@ class SLSQP(optx.AbstractMinimiser):
     is reduced. Bounds are never left, not even by rounding, and no point outside is evaluated.
 
     `options` of `optimistix.minimise`: "lower", "upper" (in the structure of y); "equality", "inequality": functions of
-    (y, args) that return an array that shall be 0, or ≥ 0; "factor": a first L, for instance the triangular factor of a
-    Gauss-Newton Hessian, transposed; "autodiff_mode": "fwd" (default: few unknowns) or "rev". One step is one
-    evaluation.
+    (y, args) that return an array that shall be 0, or ≥ 0; "in_aux": instead of these functions how many of each the
+    objective's auxiliary output holds, a vector with the equalities first, computed together with it; "factor": a
+    first L, for instance the triangular factor of a Gauss-Newton Hessian, transposed; "autodiff_mode": "fwd" (default:
+    few unknowns) or "rev". One step is one evaluation.
     """
 
     rtol: float = 1e-10
@@ -129,7 +130,8 @@ class SLSQP(optx.AbstractMinimiser):
 
         def evaluate(point: Array) -> tuple[Array, PyTree]:
             value, aux = fn(unravel(point), args)
-            return jnp.concatenate([jnp.reshape(value, (1,)), _constraints(options, unravel(point), args)]), aux
+            constraints = aux if "in_aux" in options else _constraints(options, unravel(point), args)
+            return jnp.concatenate([jnp.reshape(value, (1,)), constraints]), aux
 
         values, aux = evaluate(trial)
         merit = _merit(values, state.penalties, equalities, state.restoring)
@@ -267,6 +269,8 @@ def _constraints(options: dict, y: PyTree, args: PyTree) -> Array:
 
 
 def _sizes(options: dict, y: PyTree, args: PyTree) -> tuple[int, int]:
+    if "in_aux" in options:
+        return options["in_aux"]
     sizes = []
     for name in ("equality", "inequality"):
         function = options.get(name)

@@ -78,17 +78,20 @@ class PositioningCycle(eqx.Module):
         return simulate(self.loop, self.move, self.times, stepping=self.stepping)
 
 
-def cycle_performance(cycle: PositioningCycle, share: Float[ArrayLike, ""] = 0.99) -> PositioningPerformance:
+def cycle_performance(
+    cycle: PositioningCycle, share: Float[ArrayLike, ""] = 0.99, *, run: Trajectory | None = None
+) -> PositioningPerformance:
     """Static error, motoring energy and response time of a cycle.
 
     Args:
         cycle: the cycle.
         share: share of the travel that ends the response time [-].
+        run: simulation of the cycle, where it has been made already.
 
     Returns:
         The three measures; NaN where the simulation failed or the share is never reached.
     """
-    run = cycle.simulate()
+    run = cycle.simulate() if run is None else run
     position, velocity = run.channel("position"), run.channel("velocity")
     return PositioningPerformance(
         static_error(run.times, position, cycle.target, cycle.window).signed,

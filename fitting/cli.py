@@ -48,6 +48,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(bench, _two_inertia, "out/two-inertia")
     leipe = studies.add_parser("leipe", help="preloaded rack-and-pinion drive: load-dependent stiffness and damping")
     _add_run(leipe, _leipe, "out/leipe")
+    mauro = studies.add_parser("mauro", help="ball-screw axis: modes, Table 1 by a fitted twin, gains by gradients")
+    _add_run(mauro, _mauro, "out/mauro")
     return parser
 
 
@@ -92,3 +94,9 @@ def _leipe(out: Path) -> str:
     from fitting.identification.leipe_report import reproduce_leipe, tabulate
 
     return f"{tabulate(reproduce_leipe(out))}\nResults in {out}"
+
+
+def _mauro(out: Path) -> str:
+    from fitting.identification.mauro_report import reproduce_mauro, tabulate
+
+    return f"{tabulate(reproduce_mauro(out))}\nResults in {out}"

@@ -7,12 +7,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from fitting.identification.mauro_design import DesignStudy
 from fitting.identification.mauro_structure import Structure
 from fitting.identification.mauro_study import TableStudy
 from fitting.identification.mauro_table import REPEATED_GAIN, mauro_table
 from fitting.plots import save_figure
 from fitting.plots_axes import axes_or_new, grid_or_new
 from fitting.plots_axis import plot_closed_loop, plot_spring_deformations, plot_time_response
+from fitting.plots_design import plot_trade_off
 from twin.control import closed_loop_response
 from twin.drives import BallScrewAxis, spring_deformations
 from twin.io.units import to_si
@@ -28,13 +30,14 @@ if TYPE_CHECKING:
 _GAIN, _SPEED = 2725.0, 10.0
 
 
-def draw_all(out: Path, structure: Structure, study: TableStudy) -> None:
+def draw_all(out: Path, structure: Structure, study: TableStudy, design: DesignStudy) -> None:
     """Draw figures 6 to 11 and the residuals of Table 1.
 
     Args:
         out: folder for the pictures.
         structure: modal analysis.
         study: the twin behind Table 1.
+        design: gains found by gradients.
     """
     twin = study.fit.model
     save_figure(plot_friction(twin.six_degrees()).figure, out / "fig6_friction.png")
@@ -55,6 +58,7 @@ def draw_all(out: Path, structure: Structure, study: TableStudy) -> None:
     save_figure(ax.figure, out / "fig10_support.png")
     save_figure(plot_table(study.rows)[0].figure, out / "fig11_gain.png")
     save_figure(plot_table_residuals(study.rows)[0].figure, out / "table1_residuals.png")
+    save_figure(plot_trade_off(design.compromises).figure, out / "trade_off.png")
 
 
 def plot_friction(axis: BallScrewAxis, *, speeds: np.ndarray | None = None, ax: "Axes | None" = None) -> "Axes":

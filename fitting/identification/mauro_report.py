@@ -77,7 +77,11 @@ def summarise(structure: Structure, printed: PrintedCost, study: TableStudy, des
             "closed_form": float(np.max(np.abs(first - structure.closed_form))),
             "central_differences": float(np.max(np.abs(first - structure.differences))),
         },
-        "support_sweep_hz": {"0.5": float(support[0]), "1.0": float(structure.frequencies[1]), "1.5": float(support[-1])},
+        "support_sweep_hz": {
+            "0.5": float(support[0]),
+            "1.0": float(structure.frequencies[1]),
+            "1.5": float(support[-1]),
+        },
         "printed_cost": {"largest_deviation": printed.largest_deviation, "optimum_k_v": printed.optimum},
         "table1": [
             {

@@ -8,7 +8,7 @@ import numpy as np
 
 from fitting.fit import fit
 from fitting.identifiability import IdentifiabilityReport, identifiability
-from fitting.identification.mauro_residual import TableResidual
+from fitting.identification.mauro_residual import ColumnErrors, TableResidual
 from fitting.identification.mauro_table import MauroTable, mauro_table
 from fitting.identification.mauro_twin import TableTwin, table_space, table_start
 from fitting.result import FitResult
@@ -48,17 +48,6 @@ class PrintedCost(NamedTuple):
     """Gain of the least cost [1/min]."""
 
 
-class ColumnErrors(NamedTuple):
-    """Root mean squares over the rows of what the twin deviates from the table."""
-
-    time: float
-    """Of the response time, relative."""
-    energy: float
-    """Of the energy, relative."""
-    error: float
-    """Of the magnitude of the static error [m]."""
-
-
 def study_cost() -> PrintedCost:
     """Eq. 22 on Table 1's own columns."""
     table = mauro_table()
@@ -96,12 +85,13 @@ def rows_of(twin: TableTwin, *, rigid: bool = True, step: float = _FINE) -> Posi
         rigid: one inertia instead of six degrees of freedom.
         step: length of the integration steps [s].
     """
-    found = _performance(TableResidual.of(step=step, rigid=rigid), twin)
-    return PositioningPerformance(*(np.asarray(column) for column in found))
+    return _performance(TableResidual.of(step=step, rigid=rigid), twin)
 
 
 def column_errors(rows: PositioningPerformance, table: MauroTable | None = None) -> ColumnErrors:
-    """How far the rows are from the table; time and energy of the row that repeats another do not count.
+    """Root mean squares over the rows of what the twin deviates from the table, the error by its magnitude.
+
+    Time and energy of the row that repeats another do not count.
 
     Args:
         rows: as `rows_of` gives them.

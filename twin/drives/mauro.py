@@ -28,7 +28,7 @@ HALF_STROKE = 0.5
 END = (0.03, 0.12)
 """Chosen: diameter and length of the screw's end journal [m]."""
 MOTOR = (1.3, 0.01, 0.56, 0.56)
-"""Chosen: resistance [Ohm], inductance [H], back EMF [Vs/rad] and torque constant [Nm/A], such that Table 1 can be met."""
+"""Chosen: resistance [Ohm], inductance [H], voltage constant [Vs/rad] and torque constant [Nm/A]."""
 MOTOR_INERTIA = 0.0125
 """Chosen: inertia of the rotor [kg m²]."""
 MOTOR_SHAFT = 6e4

@@ -51,7 +51,7 @@ def plot_closed_loop(
     if output is None:
         if len(frf.outputs) > 1:
             raise InputError(f"The response has the outputs {', '.join(frf.outputs)}. Name one.")
-        output = frf.outputs[0]
+        output = next(iter(frf.outputs))
     grid = grid_or_new(axes, 2, columns=1, panel=(7.0, 2.6))
     f, g = np.asarray(frf.frequency), np.asarray(frf[output, frf.inputs[0]])
     grid[0].plot(f, 20 * np.log10(np.abs(g)), lw=1.4, label=label)

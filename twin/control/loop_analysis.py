@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Complex, Float, PyTree
@@ -63,7 +64,7 @@ def closed_loop_response(
     Source: Mauro, Pastorelli, Mohtar (2014), Fig. 7.
     """
     system = _linear(loop, (output,), friction_speed, state, reference)
-    each = frequency_response(system, frequency)
+    each = _frequency_response(system, frequency)
     s = 2j * jnp.pi * each.frequency
     parts = dict(zip(each.inputs, each.values[0], strict=True))
     values = parts["position"] + s * (parts["velocity"] + s * parts["acceleration"])
@@ -108,13 +109,13 @@ def open_loop_response(
             "The controller gives several commands, and the loop can be opened at one signal only. Name a measured one."
         )
     opened = _OpenedLoop(loop, at, held, start)
-    system = linearise(opened, start, opened.operating_inputs())
+    system = compiled_linearise(opened, start, opened.operating_inputs(), ("signal",))
     if is_concrete(system.b) and not (jnp.any(system.b) or jnp.any(system.d)):
         raise InputError(
             f"The controller does not feed back {at!r}: there is no loop to open. Name a signal that it uses; with "
             'PositionVelocityPI its `feedback` says whether that is "motor_angle" or "position".'
         )
-    through = frequency_response(system, frequency)
+    through = _frequency_response(system, frequency)
     return FRF(through.frequency, -through.values, (at,), (at,))
 
 
@@ -163,7 +164,23 @@ def _linear(
     reference: MotionPoint | None,
 ) -> StateSpace:
     loop = at_operating_point(loop, friction_speed, state)
-    return linearise(loop, state, reference, outputs=outputs or loop_outputs(loop)[:1])
+    return compiled_linearise(loop, state, reference, outputs or loop_outputs(loop)[:1])
+
+
+@eqx.filter_jit
+def compiled_linearise(plant: AbstractPlant, state: Any, inputs: Any, outputs: tuple[str, ...]) -> StateSpace:
+    """As `linearise`; in one piece, as its many small operations would each be compiled alone.
+
+    Args:
+        plant: plant or loop.
+        state: operating point.
+        inputs: operating inputs.
+        outputs: names of the outputs to keep.
+    """
+    return linearise(plant, state, inputs, outputs=outputs)
+
+
+_frequency_response = eqx.filter_jit(frequency_response)
 
 
 def loop_outputs(loop: ClosedLoop) -> tuple[str, ...]:

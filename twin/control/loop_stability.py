@@ -9,8 +9,8 @@ from jaxtyping import ArrayLike, Complex, Float
 from twin._checks import InputError
 from twin.control.closed_loop import ClosedLoop, ClosedLoopState
 from twin.control.friction_at_speed import at_operating_point
-from twin.control.loop_analysis import loop_outputs, poles_of
-from twin.linear import StateSpace, linearise
+from twin.control.loop_analysis import compiled_linearise, loop_outputs, poles_of
+from twin.linear import StateSpace
 from twin.references import MotionPoint
 
 # A growth slower than this share of the fastest pole is rounding.
@@ -103,7 +103,7 @@ def require_stable(
 
 
 def _system(loop: ClosedLoop, state: ClosedLoopState | None, reference: MotionPoint | None) -> StateSpace:
-    return linearise(loop, state, reference, outputs=loop_outputs(loop)[:1])
+    return compiled_linearise(loop, state, reference, loop_outputs(loop)[:1])
 
 
 def _describe(pole: complex) -> str:
@@ -144,7 +144,7 @@ def _cure(
 
     if not chosen:
         return "lower the gains of the controller"
-    slopes = np.asarray(jax.jacfwd(matrix)(jnp.ones(len(chosen))))
+    slopes = np.asarray(jax.jit(jax.jacfwd(matrix))(jnp.ones(len(chosen))))
     right, left = (_vector(a, pole) for a in (np.asarray(system.a), np.asarray(system.a).T))
     moves = np.real(np.einsum("i,ijk,j->k", left, slopes, right) / (left @ right))
     most = int(np.argmax(np.abs(moves)))

@@ -19,17 +19,17 @@ LEAD = 0.01
 """Chosen: lead [m]."""
 SHAFT_DIAMETER = 0.05
 """Chosen: root diameter of the screw [m]."""
-LENGTH = 1.5
+LENGTH = 2.0
 """Chosen: length of the screw [m]."""
-NUT_POSITION = 0.75
+NUT_POSITION = 1.0
 """Chosen: distance of the nut from the fixed bearing at mid-stroke [m]."""
-HALF_STROKE = 0.5
+HALF_STROKE = 0.95
 """Chosen: travel of the slide to either side of mid-stroke [m]."""
 END = (0.03, 0.12)
 """Chosen: diameter and length of the screw's end journal [m]."""
-MOTOR = (1.3, 0.01, 0.56, 0.56)
+MOTOR = (1.7, 0.0175, 0.51, 0.51)
 """Chosen: resistance [Ohm], inductance [H], voltage constant [Vs/rad] and torque constant [Nm/A]."""
-MOTOR_INERTIA = 0.0125
+MOTOR_INERTIA = 3.5e-3
 """Chosen: inertia of the rotor [kg m²]."""
 MOTOR_SHAFT = 6e4
 """Chosen: torsional stiffness of the motor's shaft [Nm/rad]."""
@@ -37,7 +37,7 @@ COUPLING = (5e4, 6e-4)
 """Chosen: torsional stiffness [Nm/rad] and inertia [kg m²] of the coupling."""
 BEARING = 3e9
 """Chosen: axial stiffness of the roller pack [N/m]."""
-SUPPORT = 5.3426e8
+SUPPORT = 7.8647e8
 """Chosen: axial stiffness of the metal support [N/m]; set so that the first frequency is the published one."""
 NUT = 1.5e9
 """Chosen: axial stiffness of the preloaded nut [N/m]."""

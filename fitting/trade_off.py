@@ -26,7 +26,7 @@ def trade_off(
     objective: GainObjective,
     space: ParameterSpace,
     *,
-    limits: Mapping[str, Float[ArrayLike, "points"]] | None = None,
+    limits: Mapping[str, Float[ArrayLike, "points"] | Sequence[float]] | None = None,
     weights: Sequence[tuple[float, float, float]] | None = None,
     constraints: Sequence[AbstractConstraint] = (),
     max_steps: int = 60,

@@ -23,7 +23,7 @@ GAINS = ParameterSpace(
         *ONE.parameters,
         Parameter("loop.controller.velocity_gain", "Vs/rad", 0.1, 3.0, scale="log"),
         Parameter("loop.controller.feedforward", "-", 0.0, 1.0),
-        Parameter("move.acceleration_limit", "m/s²", 2.0, 6.5, scale="log"),
+        Parameter("move.acceleration_limit", "m/s²", 4.0, 6.5, scale="log"),
     ]
 )
 

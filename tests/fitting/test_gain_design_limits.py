@@ -9,6 +9,7 @@ from positioning_cycles import CYCLE, GAINS, OBJECTIVE, sharp_peak
 from fitting.cycle_constraints import MeasureLimit, OvershootLimit, PeakLimit, SensitivityLimit, cycle_constraints
 from fitting.cycle_run import CycleRun
 from fitting.optimal_design import design
+from fitting.solvers.slsqp import SLSQP
 from twin._checks import InputError
 from twin.control import open_loop_response
 from twin.performance import cycle_performance, overshoot, stability_margin
@@ -25,8 +26,15 @@ def test_design_under_limits_keeps_the_sharp_ones():
     limits = {"torque": 8.0, "voltage": 70.0, "overshoot": 0.01, "error": 1e-4}
     assert sharp_peak(CYCLE, "torque") > 8.0
     assert sharp_overshoot(CYCLE) > 0.01
-    result = design(CYCLE, OBJECTIVE, GAINS, constraints=cycle_constraints(**limits), experiment=CycleRun.of)
-    assert result.success
+    result = design(
+        CYCLE,
+        OBJECTIVE,
+        GAINS,
+        constraints=cycle_constraints(**limits),
+        experiment=CycleRun.of,
+        solver=SLSQP(rtol=1e-6),
+    )
+    assert result.success, (result, result.history, result.constraint_values)
     assert result.cost < float(OBJECTIVE(CYCLE)) - 0.1
     assert "peak torque" in result.constraint_names
     cycle = result.model

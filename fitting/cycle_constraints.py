@@ -106,7 +106,7 @@ class SensitivityLimit(eqx.Module):
     """Operating point: "moving" or "rest"."""
 
     def __check_init__(self):
-        positive("limit of the sensitivity peak", jnp.asarray(self.limit) - 1.0)
+        positive("limit of the sensitivity peak less 1", jnp.asarray(self.limit) - 1.0)
         increasing("frequency of the sensitivity", self.frequency, "Hz")
         positive("width of the sensitivity peak", self.width)
         if self.at not in ("moving", "rest"):

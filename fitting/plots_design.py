@@ -2,6 +2,9 @@
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from fitting.solvers.stop import CONVERGED
 from twin._checks import InputError
 
 if TYPE_CHECKING:
@@ -46,14 +49,14 @@ def plot_trade_off(
 
         ax = pyplot.subplots(figsize=(5.6, 3.8), layout="constrained")[1]
     horizontal, vertical = _shown(table, x), _shown(table, y)
-    good = table["status"].isin(["converged", "at_precision"])
-    best = good & ~table["dominated"]
-    order = horizontal[best].sort_values().index
-    ax.plot(horizontal[order], vertical[order], color="0.6", linewidth=1, zorder=1)
+    good = np.isin(table["status"].to_numpy(dtype=str), CONVERGED)
+    dominated = table["dominated"].to_numpy(dtype=bool)
+    best, rest = good & ~dominated, good & dominated
+    order = np.argsort(horizontal[best])
+    ax.plot(horizontal[best][order], vertical[best][order], color="0.6", linewidth=1, zorder=1)
     shade = _shown(table, colour) if colour else None
     options = {} if shade is None else {"c": shade[best], "vmin": shade[good].min(), "vmax": shade[good].max()}
     points = ax.scatter(horizontal[best], vertical[best], s=36, zorder=2, label="best compromises", **options)
-    rest = good & table["dominated"]
     if rest.any():
         ax.scatter(horizontal[rest], vertical[rest], s=36, facecolors="none", edgecolors="0.4", label="dominated")
     if (~good).any():
@@ -67,6 +70,6 @@ def plot_trade_off(
     return ax
 
 
-def _shown(table: "pd.DataFrame", column: str) -> "pd.Series":
-    factor = _SHOWN.get(column, (column, 1.0))[1]
-    return factor * (table[column].abs() if column == "error [m]" else table[column])
+def _shown(table: "pd.DataFrame", column: str) -> np.ndarray:
+    values = _SHOWN.get(column, (column, 1.0))[1] * table[column].to_numpy(dtype=float)
+    return np.abs(values) if column == "error [m]" else values

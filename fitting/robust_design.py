@@ -1,7 +1,7 @@
 """Designs that hold over a spread of what the model does not know exactly."""
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -29,7 +29,7 @@ class Variations(eqx.Module):
     factors: Float[Array, "variants paths"] = eqx.field(converter=as_array)
     """Factors on the model's own values, one row per variant [-]."""
 
-    def __init__(self, factors: Mapping[str, Float[ArrayLike, "factors"]]):
+    def __init__(self, factors: Mapping[str, Float[ArrayLike, "factors"] | Sequence[float]]):
         self.paths = tuple(factors)
         rows = [np.atleast_1d(np.asarray(values, dtype=float)) for values in factors.values()]
         if not rows or any(row.ndim != 1 or row.size == 0 for row in rows):
@@ -76,7 +76,7 @@ class RobustObjective(eqx.Module):
     def __init__(
         self,
         objective: Callable[[Any], Array],
-        variations: Variations | Mapping[str, Float[ArrayLike, "factors"]],
+        variations: Variations | Mapping[str, Float[ArrayLike, "factors"] | Sequence[float]],
         *,
         spread: ArrayLike = 1.0,
         worst_case: ArrayLike | None = None,

@@ -20,14 +20,16 @@ from twin.performance import PositioningCycle, PositioningPerformance
 if TYPE_CHECKING:
     import pandas as pd
 
+_COLUMNS = tuple(f"{name} [{unit}]" for name, unit in MEASURES.items())
+
 
 def trade_off(
     cycle: PositioningCycle,
     objective: GainObjective,
     space: ParameterSpace,
     *,
-    limits: Mapping[str, Float[ArrayLike, "points"]] | None = None,
-    weights: Sequence[tuple[float, float, float]] | None = None,
+    limits: Mapping[str, Float[ArrayLike, "points"] | Sequence[float]] | None = None,
+    weights: Sequence[Sequence[float]] | None = None,
     constraints: Sequence[AbstractConstraint] = (),
     max_steps: int = 60,
     solver: SLSQP | None = None,
@@ -43,7 +45,7 @@ def trade_off(
         space: the free parameters.
         limits: largest values of one of "error" [m], "energy" [J] or "time" [s], in the order of computation: begin
             where the start is feasible.
-        weights: weights of error, energy and time.
+        weights: weights of error, energy and time, one row per point.
         constraints: further conditions.
         max_steps: evaluations of each design.
         solver: as in `design`.
@@ -66,18 +68,18 @@ def trade_off(
         result = design(
             here, weighed, space, constraints=every, experiment=CycleRun.of, max_steps=max_steps, solver=solver
         )
-        measures = PositioningPerformance(*(float(v) for v in _measures(result.model, objective)))
+        measures = _measures(result.model, objective)
         named = zip(space.parameters, result.values, strict=True)
         rows.append(
             labels
             | {parameter.label: value for parameter, value in named}
-            | {"error [m]": measures.error, "energy [J]": measures.energy, "time [s]": measures.time}
+            | dict(zip(_COLUMNS, map(float, measures), strict=True))
             | {"cost": float(objective.cost(measures)), "evaluations": result.evaluations, "status": result.stop}
         )
         # From a point that failed, the next one would hardly succeed.
         here = result.model if result.success else here
     table = pd.DataFrame(rows)
-    table["dominated"] = _dominated(np.abs(table[["error [m]", "energy [J]", "time [s]"]].to_numpy()))
+    table["dominated"] = _dominated(np.abs(table[list(_COLUMNS)].to_numpy()))
     return table
 
 

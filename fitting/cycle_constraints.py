@@ -122,7 +122,8 @@ class SensitivityLimit(eqx.Module):
             run = CycleRun.of(cycle)
             loop, (state, reference) = run.cycle.loop, run.fastest()
         else:
-            loop, state, reference = cycle.cycle.loop if isinstance(cycle, CycleRun) else cycle.loop, None, None
+            loop = cycle.cycle.loop if isinstance(cycle, CycleRun) else cycle.loop
+            state, reference = loop.initial_state(), None
         opened = open_loop_response(loop, self.frequency, state=state, reference=reference)
         margin = stability_margin(opened, width=self.width * self.limit)
         return 1 - margin.sensitivity_peak / self.limit

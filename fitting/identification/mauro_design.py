@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from fitting.cycle_constraints import cycle_constraints
+from fitting.cycle_run import CycleRun
 from fitting.design_result import DesignResult
 from fitting.gain_design import POSITION_GAIN, design_gain
 from fitting.gain_objective import GainObjective
@@ -82,7 +83,9 @@ def study_design(study: TableStudy) -> DesignStudy:
     gains = to_si(mauro_table().gain, "1/min", "1/s")
     alone = design_gain(cycle, objective, (float(gains.min()), float(gains.max())))
     limits = cycle_constraints(overshoot=_OVERSHOOT, sensitivity=_SENSITIVITY)
-    together = design(alone.model, objective, gain_space(), constraints=limits, solver=_SOLVER, max_steps=25)
+    together = design(
+        alone.model, objective, gain_space(), constraints=limits, experiment=CycleRun.of, solver=_SOLVER, max_steps=25
+    )
     # From slow to fast, each design started from the one before.
     times = np.array([1.06, 1.04, 1.02, 1.01, 1.0]) * float(study.rows.time[np.argmin(study.cost)])
     compromises = trade_off(

@@ -17,9 +17,9 @@ from twin.performance import PositioningPerformance, positioning_cost
 
 # Steps of the fit, and those that its rows are judged with [s].
 _COARSE, _FINE = 2e-4, 5e-5
-# The valley that the table leaves open is flat: the fit ends where a full step promises less than a hundredth of the
-# cost.
-_SOLVER = BoundedLevenbergMarquardt(rtol=0.1)
+# Friction that catches the axis a little earlier or later makes the cost rough, and the valley that the table leaves
+# open is flat: the fit ends where a full step of the linear model promises less than 4 % of the cost.
+_SOLVER = BoundedLevenbergMarquardt(rtol=0.2)
 
 
 class TableStudy(NamedTuple):

@@ -15,8 +15,8 @@ from twin.performance import PositioningCycle
 from twin.references import JerkLimitedMove
 from twin.stepping import ConstantSteps
 
-# Balls roll over this angle before they slide [rad]: a micrometre of travel. Friction then holds without creep.
-_PRESLIDING = 6e-4
+# Balls roll over this angle before they slide [rad], a quarter of a micrometre of travel: friction holds without creep.
+_PRESLIDING = 1.5e-4
 # The contact is damped so that the axis, held by it, has half of the critical damping.
 _CONTACT_DAMPING = 1.0
 # Length of the record after the start, move and dwell together [s]. The slowest gain needs 1.55 s to arrive.

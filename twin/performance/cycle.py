@@ -4,11 +4,12 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from twin._checks import InputError, as_array, as_scalar, increasing, positive
+from twin._checks import InputError, as_array, as_scalar, increasing, is_concrete, positive
 from twin.control.closed_loop import ClosedLoop
 from twin.performance.energy import motoring_energy
 from twin.performance.positioning import PositioningPerformance
 from twin.performance.response_time import response_time
+from twin.performance.saturation import warn_at_limit
 from twin.performance.static_error import static_error
 from twin.references import JerkLimitedMove
 from twin.simulation import simulate
@@ -74,8 +75,13 @@ class PositioningCycle(eqx.Module):
         return self.move.start_position + self.move.distance
 
     def simulate(self) -> Trajectory:
-        """The run of one cycle."""
-        return simulate(self.loop, self.move, self.times, stepping=self.stepping)
+        """The run of one cycle; with a warning if the voltage is at the controller's limit all the time."""
+        run = simulate(self.loop, self.move, self.times, stepping=self.stepping)
+        limit = getattr(self.loop.controller, "voltage_limit", None)
+        voltage = getattr(run.outputs, "voltage", None)
+        if limit is not None and voltage is not None and is_concrete(limit) and is_concrete(voltage):
+            warn_at_limit(run.times, voltage, limit)
+        return run
 
 
 def cycle_performance(

@@ -55,7 +55,8 @@ def plot_trade_off(
     order = np.argsort(horizontal[best])
     ax.plot(horizontal[best][order], vertical[best][order], color="0.6", linewidth=1, zorder=1)
     shade = _shown(table, colour) if colour else None
-    options = {} if shade is None else {"c": shade[best], "vmin": shade[good].min(), "vmax": shade[good].max()}
+    seen = good if good.any() else np.full(good.shape, True)
+    options = {} if shade is None else {"c": shade[best], "vmin": shade[seen].min(), "vmax": shade[seen].max()}
     points = ax.scatter(horizontal[best], vertical[best], s=36, zorder=2, label="best compromises", **options)
     if rest.any():
         ax.scatter(horizontal[rest], vertical[rest], s=36, facecolors="none", edgecolors="0.4", label="dominated")

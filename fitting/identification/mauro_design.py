@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from fitting.cycle_constraints import cycle_constraints
+from fitting.constraints import Inequality
+from fitting.cycle_constraints import MeasureLimit, cycle_constraints
 from fitting.cycle_run import CycleRun
 from fitting.design_result import DesignResult
 from fitting.gain_design import POSITION_GAIN, design_gain
@@ -24,8 +25,9 @@ _STEP = 2e-4
 # Gains together: allowed are a peak of 2 of the sensitivity and a thousandth of the travel beyond the target.
 _SENSITIVITY, _OVERSHOOT = 2.0, 1e-3
 _CONTROLLER = "loop.controller"
-# A tenth of a per mille of the cost is nothing beside what the model leaves open.
-_SOLVER = SLSQP(rtol=1e-4, atol=1e-6)
+# A per mille of the cost is nothing beside what the model leaves open.
+_SOLVER = SLSQP(rtol=1e-3, atol=1e-5)
+_EVALUATIONS = 25
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,18 +85,26 @@ def study_design(study: TableStudy) -> DesignStudy:
     gains = to_si(mauro_table().gain, "1/min", "1/s")
     alone = design_gain(cycle, objective, (float(gains.min()), float(gains.max())))
     limits = cycle_constraints(overshoot=_OVERSHOOT, sensitivity=_SENSITIVITY)
+    # With a limit of the energy that does not bind, the program is the one of the trade-off and is compiled once.
+    best = float(study.rows.energy[np.argmin(study.cost)])
+    free = Inequality(MeasureLimit("energy", 2 * best, objective.share))
     together = design(
-        alone.model, objective, gain_space(), constraints=limits, experiment=CycleRun.of, solver=_SOLVER, max_steps=25
+        alone.model,
+        objective,
+        gain_space(),
+        constraints=(*limits, free),
+        experiment=CycleRun.of,
+        solver=_SOLVER,
+        max_steps=_EVALUATIONS,
     )
     # With less and less energy, each design started from the one before.
-    energies = np.array([0.96, 0.92, 0.88, 0.84]) * float(study.rows.energy[np.argmin(study.cost)])
     compromises = trade_off(
         together.model,
         objective,
         gain_space(),
-        limits={"energy": energies},
+        limits={"energy": best * np.array([0.95, 0.9, 0.85])},
         constraints=limits,
         solver=_SOLVER,
-        max_steps=12,
+        max_steps=_EVALUATIONS,
     )
     return DesignStudy(float(np.min(study.cost)), alone, together, compromises)

@@ -117,7 +117,7 @@ def summarise(structure: Structure, printed: PrintedCost, study: TableStudy, des
             },
         },
         "converged": {
-            "error_um_by_half_the_step": float(1e6 * np.max(np.abs(study.half_step.error - study.rows.error))),
+            "error_um_by_four_times_the_step": float(1e6 * np.max(np.abs(study.coarse.error - study.rows.error))),
             "error_um_by_half_the_presliding": float(
                 1e6 * np.max(np.abs(study.half_presliding.error - study.rows.error))
             ),

@@ -35,8 +35,8 @@ class TableStudy(NamedTuple):
     """Eq. 22 of these rows."""
     six_degrees: PositioningPerformance
     """The same rows with six degrees of freedom."""
-    half_step: PositioningPerformance
-    """The same rows with half the step."""
+    coarse: PositioningPerformance
+    """The rows with the steps of the fit, four times as long."""
     half_presliding: PositioningPerformance
     """The same rows with friction that turns around over half the angle."""
 
@@ -77,7 +77,7 @@ def study_table(start: TableTwin | None = None, *, max_steps: int = 20) -> Table
         rows=rows,
         cost=np.asarray(positioning_cost(*rows)),
         six_degrees=rows_of(result.model, rigid=False),
-        half_step=rows_of(result.model, step=_FINE / 2),
+        coarse=rows_of(result.model, step=_COARSE),
         half_presliding=rows_of(finer),
     )
 

@@ -106,7 +106,7 @@ def study_design(study: TableStudy) -> DesignStudy:
         together.model,
         economy,
         gain_space(),
-        limits={"time": best * np.array([1.1, 1.06, 1.03, 1.01])},
+        limits={"time": best * np.array([1.1, 1.06, 1.03])},
         constraints=limits,
         solver=_SOLVER,
         max_steps=_EVALUATIONS,

@@ -47,7 +47,15 @@ def reproduce_mauro(out: Path) -> dict[str, Any]:
     write_parameters(
         out / "parameters.toml",
         [
-            ParameterEntry(p.path, float(v), p.unit, float(se), p.lower, p.upper, "Mauro et al., Table 1")
+            ParameterEntry(
+                p.path,
+                float(v),
+                p.unit,
+                float(se) if np.isfinite(se) else None,
+                p.lower,
+                p.upper,
+                "Mauro et al., Table 1",
+            )
             for p, v, se in zip(result.space.parameters, result.values, result.standard_errors, strict=True)
         ],
     )

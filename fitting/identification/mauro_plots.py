@@ -20,8 +20,9 @@ from twin.control import closed_loop_response
 from twin.drives import BallScrewAxis, spring_deformations
 from twin.io.units import to_si
 from twin.laws import ViscousFriction
-from twin.performance import PositioningPerformance, positioning_cost
+from twin.performance import PositioningCycle, PositioningPerformance, positioning_cost
 from twin.plots import plot_sweep
+from twin.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -54,7 +55,7 @@ def draw_all(out: Path, structure: Structure, study: TableStudy, design: DesignS
     assert axes is not None
     save_figure(axes[0].figure, out / "fig7_closed_loop.png")
     cycle = twin.cycle(to_si(_GAIN, "1/min", "1/s"), rigid=False)
-    save_figure(plot_time_response(cycle.simulate(), cycle.move)[0].figure, out / "fig8_time_response.png")
+    save_figure(plot_time_response(_simulated(cycle), cycle.move)[0].figure, out / "fig8_time_response.png")
     save_figure(plot_spring_deformations(spring_deformations(structure.axis)).figure, out / "fig9_deformations.png")
     ax = plot_sweep(structure.support_sweep)
     ax.set_xlabel("stiffness of the support k₀ / chosen value [-]")
@@ -133,3 +134,8 @@ def plot_table_residuals(
         ax.set_ylabel(label)
     axes[-1].set_xlabel("position gain k_v [1/min]")
     return axes
+
+
+@eqx.filter_jit
+def _simulated(cycle: PositioningCycle) -> Trajectory:
+    return cycle.simulate()

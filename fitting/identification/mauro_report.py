@@ -50,7 +50,7 @@ def reproduce_mauro(out: Path) -> dict[str, Any]:
             ParameterEntry(
                 p.path,
                 float(v),
-                p.unit,
+                p.unit or "1",
                 float(se) if np.isfinite(se) else None,
                 p.lower,
                 p.upper,

@@ -75,7 +75,10 @@ class PositioningCycle(eqx.Module):
         return self.move.start_position + self.move.distance
 
     def simulate(self) -> Trajectory:
-        """The run of one cycle; with a warning if the voltage is at the controller's limit all the time."""
+        """The run of one cycle; with a warning if the voltage is at the controller's limit all the time.
+
+        Called for many cycles, `eqx.filter_jit` around it compiles once, without the warning.
+        """
         run = simulate(self.loop, self.move, self.times, stepping=self.stepping)
         limit = getattr(self.loop.controller, "voltage_limit", None)
         voltage = getattr(run.outputs, "voltage", None)

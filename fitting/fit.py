@@ -108,10 +108,12 @@ def result_of(
     held = set(hold)
     priors = sum(p.prior is not None for p in space.parameters)
     free = np.flatnonzero([path not in held for path in space.paths])
+    # A step that was not made may have ended on a bound where the fit did not.
+    active = (np.asarray(solved.active) & _on_bound(np.asarray(solved.vector), space))[free]
     covariance = covariance_of(
         residual,
         jacobian[:, free],
-        np.asarray(solved.active)[free],
+        active,
         series=correlated,
         priors=priors,
         curvature=None if solved.curvature is None else np.asarray(solved.curvature),
@@ -128,7 +130,7 @@ def result_of(
         condition_number=covariance.condition_number,
         degrees_of_freedom=covariance.degrees_of_freedom,
         unseen=covariance.unseen,
-        active=np.asarray(solved.active)[free],
+        active=active,
         residual=residual,
         cost_history=history[np.isfinite(history)],
         steps=int(solved.steps),
@@ -211,3 +213,10 @@ def check_residual(residual: AbstractResidual, model: Any, space: ParameterSpace
             "Add data or priors, or free fewer parameters."
         )
     return shape.shape[0]
+
+
+def _on_bound(vector: np.ndarray, space: ParameterSpace) -> np.ndarray:
+    """Which entries of a scaled vector sit on a bound, to rounding."""
+    lower, upper = np.asarray(space.lower), np.asarray(space.upper)
+    near = 1e-9 * (1 + np.abs(vector))
+    return (vector <= lower + near) | (vector >= upper - near)

@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from twin.drives import BallScrewAxis, PerSpring, lumped_elasticities, mauro_axis, spring_deformations
+from fitting.identification.mauro_axis import table_axis
+from twin.drives import BallScrewAxis, PerSpring, lumped_elasticities, spring_deformations
 from twin.modal import Elasticities, modes
 from twin.sweep import Sweep, sweep
 
@@ -52,7 +53,7 @@ def study_structure(axis: BallScrewAxis | None = None) -> Structure:
     Args:
         axis: ball screw axis; that of the paper, completed by chosen values, if not given.
     """
-    axis = mauro_axis() if axis is None else axis
+    axis = table_axis() if axis is None else axis
     found, stiffness = modes(axis.second_order()), axis.stiffness()
     deformations = spring_deformations(axis)
     size = {name: abs(float(value)) for name, value in deformations.axial._asdict().items()}

@@ -4,9 +4,10 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from fitting.identification.mauro_axis import table_axis
 from twin._checks import as_scalar, positive
 from twin.control import ClosedLoop, PositionVelocityPI
-from twin.drives import BallScrewAxis, mauro_axis
+from twin.drives import BallScrewAxis
 from twin.drives.dc_motor import DcMotor
 from twin.laws import DahlFriction
 from twin.parameters import Parameter, ParameterSpace
@@ -151,7 +152,7 @@ def table_start() -> TableTwin:
     `multistart(TableResidual.of(), table_start(), table_space(), ...)` searches for others.
     """
     return TableTwin(
-        axis=mauro_axis(),
+        axis=table_axis(),
         slide_mass=200.0,
         motor_inertia=0.00398,
         torque_constant=0.5174,

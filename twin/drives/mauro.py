@@ -15,21 +15,21 @@ FIRST_FREQUENCY = 152.0
 DAMPING_RATIO = 0.03
 """Damping ratio of that mode [-]; section 5."""
 
-LEAD = 0.01
+LEAD = 0.02
 """Chosen: lead [m]."""
-SHAFT_DIAMETER = 0.05
+SHAFT_DIAMETER = 0.045
 """Chosen: root diameter of the screw [m]."""
-LENGTH = 2.0
+LENGTH = 1.5
 """Chosen: length of the screw [m]."""
-NUT_POSITION = 1.0
+NUT_POSITION = 0.75
 """Chosen: distance of the nut from the fixed bearing at mid-stroke [m]."""
-HALF_STROKE = 0.95
+HALF_STROKE = 0.5
 """Chosen: travel of the slide to either side of mid-stroke [m]."""
 END = (0.03, 0.12)
 """Chosen: diameter and length of the screw's end journal [m]."""
-MOTOR = (1.7, 0.0175, 0.51, 0.51)
-"""Chosen: resistance [Ohm], inductance [H], voltage constant [Vs/rad] and torque constant [Nm/A]."""
-MOTOR_INERTIA = 3.5e-3
+MOTOR = (0.35, 4e-3, 1.5, 1.5)
+"""Chosen: resistance [Ohm], inductance [H], back EMF [Vs/rad] and torque constant [Nm/A], as of a 20 Nm servo motor."""
+MOTOR_INERTIA = 3e-3
 """Chosen: inertia of the rotor [kg m²]."""
 MOTOR_SHAFT = 6e4
 """Chosen: torsional stiffness of the motor's shaft [Nm/rad]."""
@@ -37,7 +37,7 @@ COUPLING = (5e4, 6e-4)
 """Chosen: torsional stiffness [Nm/rad] and inertia [kg m²] of the coupling."""
 BEARING = 3e9
 """Chosen: axial stiffness of the roller pack [N/m]."""
-SUPPORT = 7.8647e8
+SUPPORT = 4.0507e8
 """Chosen: axial stiffness of the metal support [N/m]; set so that the first frequency is the published one."""
 NUT = 1.5e9
 """Chosen: axial stiffness of the preloaded nut [N/m]."""

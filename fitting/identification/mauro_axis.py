@@ -1,6 +1,6 @@
 """The axis that the twin of Mauro's Table 1 is built on: what of `twin.drives.mauro` the table asks to be otherwise.
 
-The travel that Table 1 asks for needs a longer screw, the moved mass half the lead and another motor, and the support is
+The travel that Table 1 asks for needs a longer screw, the moved mass half the lead and another motor; the support is
 as stiff as the first natural frequency of 152 Hz asks for. Every value is chosen.
 """
 

@@ -69,10 +69,10 @@ def gain_space() -> ParameterSpace:
     """Gains of position and velocity controller, and the feed-forward."""
     return ParameterSpace(
         [
-            Parameter(POSITION_GAIN, "1/s", 10, 120, scale="log"),
-            Parameter(f"{_CONTROLLER}.velocity_gain", "Vs/rad", 0.5, 20, scale="log"),
-            Parameter(f"{_CONTROLLER}.integral_gain", "V/rad", 1e-2, 100, scale="log"),
-            Parameter(f"{_CONTROLLER}.feedforward", "", 0, 1),
+            Parameter(POSITION_GAIN, "1/s", 10.0, 120.0, scale="log"),
+            Parameter(f"{_CONTROLLER}.velocity_gain", "Vs/rad", 0.5, 20.0, scale="log"),
+            Parameter(f"{_CONTROLLER}.integral_gain", "V/rad", 1e-2, 100.0, scale="log"),
+            Parameter(f"{_CONTROLLER}.feedforward", "", 0.0, 1.0),
         ]
     )
 

@@ -141,7 +141,7 @@ def table_space() -> ParameterSpace:
         ("jerk", "m/s³", 10, 1000, "log"),
     )
     return ParameterSpace(
-        [Parameter(path, unit, lower, upper, scale=scale) for path, unit, lower, upper, scale in rows]
+        [Parameter(path, unit, float(lower), float(upper), scale=scale) for path, unit, lower, upper, scale in rows]
     )
 
 

@@ -33,7 +33,7 @@ def test_gains_and_move_together():
     objective = GainObjective.of_sweep(*rows_of(twin, step=2e-4))
     move = (
         Parameter("move.velocity_limit", "m/s", 0.4, 1.2, scale="log"),
-        Parameter("move.jerk_limit", "m/s³", 20, 400, scale="log"),
+        Parameter("move.jerk_limit", "m/s³", 20.0, 400.0, scale="log"),
     )
     limits = cycle_constraints(torque=TORQUE, error=ERROR, overshoot=OVERSHOOT, sensitivity=SENSITIVITY)
     result = design(

@@ -1,6 +1,5 @@
 """The demo: a servo axis with known parameters is simulated, recorded with noise, and identified from the records."""
 
-import json
 import time
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from fitting.identification.output_error import output_error
+from fitting.json_file import write_json
 from fitting.plots import plot_comparison, plot_intervals, save_figure
 from fitting.result import FitResult
 from twin.control import SampledLoop, SampledPositionVelocity
@@ -116,7 +116,7 @@ def _write(out: Path, result: FitResult, truth: dict[str, float], seconds: float
         "condition_number": result.condition_number,
         "seconds": seconds,
     }
-    (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    write_json(out / "summary.json", summary)
     entries = [
         ParameterEntry(p.path, float(v), p.unit, float(se), p.lower, p.upper, "demo, simulated records")
         for p, v, se in zip(result.space.parameters, result.values, result.standard_errors, strict=True)

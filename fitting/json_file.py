@@ -14,7 +14,9 @@ def write_json(path: Path, content: dict[str, Any]) -> None:
         path: the file.
         content: dicts and lists of numbers and text.
     """
-    path.write_text(json.dumps(_without_nan(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    path.write_text(
+        json.dumps(_without_nan(content), indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8"
+    )
 
 
 def _without_nan(value: Any) -> Any:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import ArrayLike
 
-from fitting.plots_axes import axes_or_new
 from fitting.result import FitResult
+from twin._axes import axes_or_new
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import jax
 import numpy as np
 
-from fitting.plots_axes import axes_or_new, grid_or_new
+from twin._axes import axes_or_new, grid_or_new
 from twin._checks import InputError
 from twin.drives import SpringDeformations
 from twin.frf import FRF

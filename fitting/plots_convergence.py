@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fitting.plots_axes import axes_or_new
 from fitting.result import FitResult
+from twin._axes import axes_or_new
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fitting.solvers.stop import CONVERGED
+from twin._axes import axes_or_new
 from twin._checks import InputError
 
 if TYPE_CHECKING:
@@ -44,10 +45,7 @@ def plot_trade_off(
     for column in (x, y, "status", "dominated", *([colour] if colour else [])):
         if column not in table.columns:
             raise InputError(f"The table has no column {column!r}; it has {', '.join(map(str, table.columns))}.")
-    if ax is None:
-        from matplotlib import pyplot
-
-        ax = pyplot.subplots(figsize=(5.6, 3.8), layout="constrained")[1]
+    ax = axes_or_new(ax, (5.6, 3.8))
     horizontal, vertical = _shown(table, x), _shown(table, y)
     good = np.isin(table["status"].to_numpy(dtype=str), CONVERGED)
     dominated = table["dominated"].to_numpy(dtype=bool)

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import ArrayLike
 from scipy import stats
 
-from fitting.plots_axes import axes_or_new, grid_or_new
 from fitting.result import FitResult
+from twin._axes import axes_or_new, grid_or_new
 from twin._checks import InputError
 
 if TYPE_CHECKING:

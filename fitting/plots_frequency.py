@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
-from fitting.plots_axes import axes_or_new
+from twin._axes import axes_or_new
 from twin._checks import InputError
 from twin.frf import FRF
 

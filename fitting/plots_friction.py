@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fitting.identification.friction_curve import FrictionCurve
-from fitting.plots_axes import axes_or_new
+from twin._axes import axes_or_new
 from twin.laws import AbstractStaticFriction
 
 if TYPE_CHECKING:

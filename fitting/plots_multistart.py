@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fitting.multistart import MultistartResult
-from fitting.plots_axes import axes_or_new
+from twin._axes import axes_or_new
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

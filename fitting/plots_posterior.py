@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import stats
 
-from fitting.plots_axes import add_shared_legend, grid_or_new, is_wide, scale_axis
+from fitting.plots_axes import add_shared_legend, is_wide, scale_axis
 from fitting.posterior_result import Posterior
 from fitting.profile import ProfileResult
 from fitting.result import FitResult
+from twin._axes import grid_or_new
 from twin._checks import InputError
 from twin.parameters import Parameter
 

@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fitting.plots_axes import add_shared_legend, axes_or_new, grid_or_new, scale_axis
+from fitting.plots_axes import add_shared_legend, scale_axis
 from fitting.profile import Profile, ProfileResult
 from fitting.result import FitResult
+from twin._axes import axes_or_new, grid_or_new
 from twin.parameters import Parameter
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from jaxtyping import ArrayLike, Float
 
 from fitting.identification.load_surface import LoadSurfaceFit
 from fitting.identification.preload_chain import ChainPoint
-from fitting.plots_axes import axes_or_new, grid_or_new
 from fitting.residuals.load_surface import total_over_contacts
+from twin._axes import axes_or_new, grid_or_new
 from twin.laws import AbstractLoadLaw
 
 if TYPE_CHECKING:

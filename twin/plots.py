@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from twin._axes import axes_or_new, grid_or_new
 from twin._checks import InputError
 from twin.sweep import Sweep
 
@@ -38,10 +39,7 @@ def plot_sweep(sweep: Sweep, result: str | None = None, *, ax: "Axes | None" = N
             )
         (result,) = sweep.results
     values = sweep[result]
-    if ax is None:
-        from matplotlib import pyplot
-
-        ax = pyplot.subplots(figsize=(5.6, 3.6), layout="constrained")[1]
+    ax = axes_or_new(ax, (5.6, 3.6))
     if values.ndim == 1:
         _draw_line(ax, sweep, values)
         ax.set_ylabel(sweep.label(result))
@@ -69,20 +67,7 @@ def plot_sweep_panels(
         InputError: an unknown result, or another number of axes than results.
     """
     names = list(sweep.results) if results is None else list(results)
-    if axes is None:
-        from matplotlib import pyplot
-
-        columns = min(len(names), 3)
-        rows = -(-len(names) // columns)
-        size = (4.4 * columns, 3.2 * rows)
-        grid = pyplot.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False)[1].ravel()
-        for unused in grid[len(names) :]:
-            unused.remove()
-        grid = grid[: len(names)]
-    else:
-        grid = np.asarray(axes, dtype=object).ravel()
-        if grid.size != len(names):
-            raise InputError(f"axes holds {grid.size} axes for {len(names)} results. Give as many, or none.")
+    grid = grid_or_new(axes, len(names), panel=(4.4, 3.2))
     for name, ax in zip(names, grid, strict=True):
         plot_sweep(sweep, name, ax=ax)
     return grid

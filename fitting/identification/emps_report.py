@@ -1,6 +1,5 @@
 """The report of the EMPS study: `summary.json`, fitted parameters, plots, and a text."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +8,7 @@ import numpy as np
 from fitting.identification.emps import EmpsStudy, Score, information_criteria, score, simulate_record
 from fitting.identification.emps_model import CYCLE, PERIOD, SCREW_LEAD, pulse_gain, with_screw_phase
 from fitting.identification.inverse_dynamics import DerivativeFilter
+from fitting.json_file import write_json
 from fitting.plots import plot_comparison, plot_correlation, plot_intervals, plot_residual, save_figure
 from fitting.result import FitResult
 from twin.io.parameter_file import ParameterEntry, write_parameters
@@ -28,7 +28,7 @@ def write_emps_report(study: EmpsStudy, out: Path) -> str:
         out: folder, which exists.
     """
     summary = emps_summary(study)
-    (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    write_json(out / "summary.json", summary)
     fit = study.fit
     entries = [
         ParameterEntry(p.path, float(v), p.unit, _number(se), p.lower, p.upper, "EMPS training record, output error")

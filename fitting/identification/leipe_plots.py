@@ -18,8 +18,8 @@ from fitting.identification.leipe import (
 from fitting.identification.leipe_bench import bench_drive
 from fitting.identification.leipe_reconstruction import Reconstruction, reconstruct
 from fitting.plots import plot_comparison, save_figure
-from fitting.plots_axes import grid_or_new
 from fitting.plots_rack_pinion import plain_ticks, plot_load_surface, plot_preload_responses, plot_quadrants
+from twin._axes import grid_or_new
 from twin.drives import RackPinionDrive
 
 

@@ -13,9 +13,9 @@ from fitting.identification.mauro_structure import Structure
 from fitting.identification.mauro_study import TableStudy
 from fitting.identification.mauro_table import REPEATED_GAIN, mauro_table
 from fitting.plots import save_figure
-from fitting.plots_axes import axes_or_new, grid_or_new
 from fitting.plots_axis import plot_closed_loop, plot_spring_deformations, plot_time_response
 from fitting.plots_design import plot_trade_off
+from twin._axes import axes_or_new, grid_or_new
 from twin.control import closed_loop_response
 from twin.drives import BallScrewAxis, spring_deformations
 from twin.io.units import to_si

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitting.identification.mauro_axis import table_axis
+from fitting.identification.mauro_table_axis import table_axis
 from twin.drives import BallScrewAxis, PerSpring, lumped_elasticities, spring_deformations
 from twin.modal import Elasticities, modes
 from twin.sweep import Sweep, sweep

@@ -3,13 +3,12 @@
 from typing import NamedTuple
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
 from fitting.fit import fit
 from fitting.identifiability import IdentifiabilityReport, identifiability
 from fitting.identification.mauro_residual import ColumnErrors, TableResidual
-from fitting.identification.mauro_table import MauroTable, mauro_table
+from fitting.identification.mauro_table import REPEATED_GAIN, MauroTable, mauro_table
 from fitting.identification.mauro_twin import TableTwin, table_space, table_start
 from fitting.result import FitResult
 from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt
@@ -103,7 +102,7 @@ def column_errors(rows: PositioningPerformance, table: MauroTable | None = None)
         table: Table 1 if not given.
     """
     table = mauro_table() if table is None else table
-    counted = np.asarray(TableResidual.of(table).counted) > 0
+    counted = table.gain != REPEATED_GAIN
     return ColumnErrors(
         time=_rms((np.asarray(rows.time) / table.time - 1)[counted]),
         energy=_rms((np.asarray(rows.energy) / (1e3 * table.energy) - 1)[counted]),
@@ -117,4 +116,4 @@ def _performance(residual: TableResidual, twin: TableTwin) -> PositioningPerform
 
 
 def _rms(values: np.ndarray) -> float:
-    return float(jnp.sqrt(jnp.mean(values**2)))
+    return float(np.sqrt(np.mean(values**2)))

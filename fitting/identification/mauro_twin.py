@@ -4,7 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from fitting.identification.mauro_axis import table_axis
+from fitting.identification.mauro_table_axis import table_axis
 from twin._checks import as_scalar, positive
 from twin.control import ClosedLoop, PositionVelocityPI
 from twin.drives import BallScrewAxis

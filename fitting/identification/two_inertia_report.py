@@ -1,6 +1,5 @@
 """Report on the two-inertia bench: what the fit to record A says about record B, in numbers, parameters and plots."""
 
-import json
 import os
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from fitting.identification.two_inertia_bench import (
     share_within,
 )
 from fitting.identification.two_mass import two_mass_response
+from fitting.json_file import write_json
 from fitting.plots_frequency import plot_log_error, plot_magnitude, plot_phase
 from twin.io.parameter_file import ParameterEntry, write_parameters
 
@@ -52,7 +52,7 @@ def reproduce_two_inertia(
     folder = Path(out_dir)
     folder.mkdir(parents=True, exist_ok=True)
     summary = summarise(prediction)
-    (folder / "summary.json").write_text(json.dumps(summary, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_json(folder / "summary.json", summary)
     _write_parameters(prediction, folder / "parameters.toml")
     _plot(prediction, folder)
     return summary

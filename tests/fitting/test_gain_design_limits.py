@@ -66,7 +66,7 @@ def test_limits_lie_on_the_safe_side_of_the_sharp_measures():
 def test_sensitivity_is_that_of_the_opened_loop():
     state, reference = CycleRun.of(CYCLE).fastest()
     opened = {
-        "rest": open_loop_response(CYCLE.loop, F),
+        "rest": open_loop_response(CYCLE.loop, F, state=CYCLE.loop.initial_state()),
         "moving": open_loop_response(CYCLE.loop, F, state=state, reference=reference),
     }
     for at, response in opened.items():

@@ -9,12 +9,12 @@ import pytest
 
 from fitting.fit import fit
 from fitting.plots import plot_comparison, plot_correlation, plot_intervals, plot_residual, save_figure
-from fitting.plots_axes import grid_or_new
 from fitting.plots_convergence import plot_convergence
 from fitting.plots_diagnostics import plot_autocorrelation, plot_diagnostics, plot_quantiles, plot_sequence
 from tests.fitting.curves import LINE_X as X
 from tests.fitting.curves import LINE_Y as Y
 from tests.fitting.curves import Line, LineResidual
+from twin._axes import grid_or_new
 from twin._checks import InputError
 from twin.parameters import Parameter, ParameterSpace
 

@@ -53,7 +53,15 @@ FRICTION = {
         (
             LuGreFriction(9.0, 13.0, 0.02, 5e4, 150.0, 100.0, W),
             DahlFriction(
-                9.0, 100.0, 2e-4, asymmetry=-20.0, rise=2.0, rate_limit=1000.0, width=W, initial_direction=-0.2
+                9.0,
+                100.0,
+                2e-4,
+                asymmetry=-20.0,
+                rise=2.0,
+                rate_limit=1000.0,
+                width=W,
+                damping=30.0,
+                initial_direction=-0.2,
             ),
         )
     ),

@@ -5,6 +5,8 @@ at least twice as much as any other in that mode (Fig. 9), and Table 1. Every ma
 constant and friction level below is ours, of the size of parts in catalogues, chosen so that these statements hold.
 """
 
+from typing import Any
+
 from twin.drives.ball_screw import BallScrewAxis
 from twin.drives.ball_screw_catalogue import ball_screw_axis
 from twin.drives.dc_motor import DcMotor
@@ -52,26 +54,34 @@ FRICTION = (1.2, 1.8, 4.0, 0.01, 0.3)
 [rad/s]; the measured curve of Fig. 6 is not published in numbers."""
 
 
-def mauro_axis() -> BallScrewAxis:
-    """A ball screw axis of which hold the published statements: 152 Hz, 3 %, and a support that deforms most."""
-    return ball_screw_axis(
-        shaft_diameter=SHAFT_DIAMETER,
-        length=LENGTH,
-        lead=LEAD,
-        nut_position=NUT_POSITION,
-        end_diameter=END[0],
-        end_length=END[1],
-        motor=DcMotor(*MOTOR),
-        motor_inertia=MOTOR_INERTIA,
-        motor_shaft=MOTOR_SHAFT,
-        coupling=COUPLING[0],
-        coupling_inertia=COUPLING[1],
-        bearing=BEARING,
-        support=SUPPORT,
-        nut=NUT,
-        flange=FLANGE,
-        nut_mass=NUT_MASS,
-        slide_mass=SLIDE_MASS,
-        friction=StribeckFriction(*FRICTION),
-        damping_ratio=DAMPING_RATIO,
-    )
+def mauro_axis(**changed: Any) -> BallScrewAxis:
+    """A ball screw axis of which hold the published statements: 152 Hz, 3 %, and a support that deforms most.
+
+    Args:
+        **changed: values of `ball_screw_axis` to be otherwise; the statements need not hold any more.
+
+    Raises:
+        InputError: if a value is out of its range.
+    """
+    values = {
+        "shaft_diameter": SHAFT_DIAMETER,
+        "length": LENGTH,
+        "lead": LEAD,
+        "nut_position": NUT_POSITION,
+        "end_diameter": END[0],
+        "end_length": END[1],
+        "motor": DcMotor(*MOTOR),
+        "motor_inertia": MOTOR_INERTIA,
+        "motor_shaft": MOTOR_SHAFT,
+        "coupling": COUPLING[0],
+        "coupling_inertia": COUPLING[1],
+        "bearing": BEARING,
+        "support": SUPPORT,
+        "nut": NUT,
+        "flange": FLANGE,
+        "nut_mass": NUT_MASS,
+        "slide_mass": SLIDE_MASS,
+        "friction": StribeckFriction(*FRICTION),
+        "damping_ratio": DAMPING_RATIO,
+    }
+    return ball_screw_axis(**(values | changed))

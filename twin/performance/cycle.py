@@ -6,11 +6,8 @@ from jaxtyping import Array, ArrayLike, Float
 
 from twin._checks import InputError, as_array, as_scalar, increasing, is_concrete, positive
 from twin.control.closed_loop import ClosedLoop
-from twin.performance.energy import motoring_energy
-from twin.performance.positioning import PositioningPerformance
-from twin.performance.response_time import response_time
+from twin.performance.positioning import PositioningPerformance, positioning_performance
 from twin.performance.saturation import warn_at_limit
-from twin.performance.static_error import static_error
 from twin.references import JerkLimitedMove
 from twin.simulation import simulate
 from twin.stepping import AbstractStepping, ConstantSteps
@@ -100,12 +97,11 @@ def cycle_performance(
     Returns:
         The three measures; NaN where the simulation failed or the share is never reached.
     """
-    run = cycle.simulate() if run is None else run
-    position, velocity = run.channel("position"), run.channel("velocity")
-    return PositioningPerformance(
-        static_error(run.times, position, cycle.target, cycle.window).signed,
-        motoring_energy(run.times, run.channel("power")),
-        response_time(
-            run.times, position, cycle.target, start=cycle.move.start_position, share=share, velocity=velocity
-        ),
+    return positioning_performance(
+        cycle.simulate() if run is None else run,
+        cycle.target,
+        window=cycle.window,
+        start=cycle.move.start_position,
+        share=share,
+        velocity="velocity",
     )

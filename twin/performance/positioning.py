@@ -29,9 +29,11 @@ def positioning_performance(
     target: Float[ArrayLike, ""],
     *,
     window: Float[ArrayLike, ""],
+    start: Float[ArrayLike, ""] | None = None,
     share: Float[ArrayLike, ""] = 0.99,
     width: Float[ArrayLike, ""] | None = None,
     position: str = "position",
+    velocity: str | None = None,
     power: str = "power",
 ) -> PositioningPerformance:
     """Static error, motoring energy and response time of a simulated move from where it starts to a target.
@@ -40,9 +42,12 @@ def positioning_performance(
         trajectory: a simulation.
         target: end of the move [m or rad].
         window: time at the end over which the static error is averaged [s].
+        start: where the move began [m or rad]; the first position if not given.
         share: share of the travel that ends the response time [-].
         width: power over which counting sets in, as in `motoring_energy` [W].
         position: name of the output that is positioned.
+        velocity: name of the output that is its speed, for a response time on a cubic between samples; on a straight
+            line if not given.
         power: name of the output that is the electrical power.
 
     Returns:
@@ -55,7 +60,9 @@ def positioning_performance(
     return PositioningPerformance(
         static_error(t, x, target, window).signed,
         motoring_energy(t, trajectory.channel(power), width=width),
-        response_time(t, x, target, share=share),
+        response_time(
+            t, x, target, start=start, share=share, velocity=None if velocity is None else trajectory.channel(velocity)
+        ),
     )
 
 

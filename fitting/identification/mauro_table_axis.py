@@ -5,19 +5,8 @@ as stiff as the first natural frequency of 152 Hz asks for. Every value is chose
 """
 
 from twin.drives.ball_screw import BallScrewAxis
-from twin.drives.ball_screw_catalogue import ball_screw_axis
 from twin.drives.dc_motor import DcMotor
-from twin.drives.mauro import BEARING as BEARING
-from twin.drives.mauro import COUPLING as COUPLING
-from twin.drives.mauro import DAMPING_RATIO as DAMPING_RATIO
-from twin.drives.mauro import END as END
-from twin.drives.mauro import FLANGE as FLANGE
-from twin.drives.mauro import FRICTION as FRICTION
-from twin.drives.mauro import MOTOR_SHAFT as MOTOR_SHAFT
-from twin.drives.mauro import NUT as NUT
-from twin.drives.mauro import NUT_MASS as NUT_MASS
-from twin.drives.mauro import SLIDE_MASS as SLIDE_MASS
-from twin.laws import StribeckFriction
+from twin.drives.mauro import mauro_axis
 
 LEAD = 0.01
 """Chosen: lead [m]."""
@@ -39,24 +28,12 @@ SUPPORT = 7.8647e8
 
 def table_axis() -> BallScrewAxis:
     """A ball screw axis with 152 Hz, 3 %, a support that deforms most, and the travel of Table 1."""
-    return ball_screw_axis(
+    return mauro_axis(
         shaft_diameter=SHAFT_DIAMETER,
         length=LENGTH,
         lead=LEAD,
         nut_position=NUT_POSITION,
-        end_diameter=END[0],
-        end_length=END[1],
         motor=DcMotor(*MOTOR),
         motor_inertia=MOTOR_INERTIA,
-        motor_shaft=MOTOR_SHAFT,
-        coupling=COUPLING[0],
-        coupling_inertia=COUPLING[1],
-        bearing=BEARING,
         support=SUPPORT,
-        nut=NUT,
-        flange=FLANGE,
-        nut_mass=NUT_MASS,
-        slide_mass=SLIDE_MASS,
-        friction=StribeckFriction(*FRICTION),
-        damping_ratio=DAMPING_RATIO,
     )

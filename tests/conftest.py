@@ -12,7 +12,7 @@ from twin._loop_option import make_small_loops_one_function
 make_small_loops_one_function()
 # Most of a run is compilation. The workers share what one of them compiled, commands and notebooks that tests start
 # do as well, and so does the next run. JAX keys the entries by program, options, versions and processor.
-_cache = str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
+_cache = str(Path(__file__).parents[1] / ".jax_cache")
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", _cache)
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.3")
 jax.config.update("jax_compilation_cache_dir", os.environ["JAX_COMPILATION_CACHE_DIR"])

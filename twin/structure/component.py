@@ -103,6 +103,6 @@ def _shaped(name: str, value: Any, expected: tuple[int, ...], meaning: str) -> N
     shape = getattr(value, "shape", expected)
     if shape != expected:
         raise InputError(
-            f"{name} must have the shape {expected} {meaning}, but has {shape}. Check that frequencies, shapes and node "
-            "names come from the same model."
+            f"{name} must have the shape {expected} {meaning}, but has {shape}. Check that frequencies, shapes and "
+            "node names come from the same model."
         )

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from twin._checks import InputError, finite
@@ -13,9 +12,9 @@ from twin.structure._check_machine import check_machine
 from twin.structure.component import Component
 from twin.structure.connections import Connections, connect
 from twin.structure.directions import DIRECTIONS
-from twin.structure.joint import Attachment, Joint
+from twin.structure.joint import Joint
 from twin.structure.lumped_mass import LumpedMass
-from twin.structure.point_rows import point_rows
+from twin.structure.motions import Motions, Row
 
 
 class Machine(eqx.Module):
@@ -56,7 +55,7 @@ class Machine(eqx.Module):
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names "node direction" of what can be measured or excited: at the nodes, then at named points on rails."""
-        return tuple(f"{name} {direction}" for name in self._measured() for direction in DIRECTIONS)
+        return tuple(f"{name} {direction}" for name in self._nodes() for direction in DIRECTIONS)
 
     def second_order(
         self,
@@ -82,26 +81,26 @@ class Machine(eqx.Module):
             InputError: 64-bit mode off, a position off a rail or not finite, an unknown input or output.
         """
         finite("position", position, "m")
+        motions = Motions(self.components, self.joints, position)
+        joined = connect(self.joints, motions)
         parts = [self.components[name] for name in sorted(self.components)]
         own = jnp.concatenate([part.own_eigenvalues for part in parts])
         lost = jnp.concatenate([part.loss_factor * part.own_eigenvalues for part in parts])
-        joined = self.connections(position)
 
         def coupled(diagonal: Array, values: Array) -> Array:
             return jnp.diag(diagonal) + (joined.vectors * values) @ joined.vectors.T
 
-        measured = self._measured()
-        chosen = [self._rows(names) for names in (inputs, outputs)]
-        motions = point_rows(self.components, list(measured.values()), position).reshape(-1, own.size)
+        excited = self.outputs if inputs is None else tuple(inputs)
+        measured = self.outputs if outputs is None else tuple(outputs)
         return SecondOrder(
-            mass=self._mass(own.size),
+            mass=self._mass(motions, own.size),
             viscous=coupled(jnp.zeros_like(own), joined.viscous),
             hysteretic=coupled(lost, joined.hysteretic),
             stiffness=coupled(own, joined.stiffness),
-            input_map=motions[chosen[0]].T,
-            output_map=motions[chosen[1]],
-            inputs=self.outputs if inputs is None else tuple(inputs),
-            outputs=self.outputs if outputs is None else tuple(outputs),
+            input_map=motions.rows(self._places(excited)).T,
+            output_map=motions.rows(self._places(measured)),
+            inputs=excited,
+            outputs=measured,
         )
 
     def connections(self, position: Float[ArrayLike, ""] = 0.0) -> Connections:
@@ -113,36 +112,30 @@ class Machine(eqx.Module):
         Raises:
             InputError: a position off a rail.
         """
-        return connect(self.components, self.joints, position)
+        return connect(self.joints, Motions(self.components, self.joints, position))
 
-    def _mass(self, size: int) -> Float[Array, "dofs dofs"]:
+    def _mass(self, motions: Motions, size: int) -> Float[Array, "dofs dofs"]:
         lumps = [self.masses[name] for name in sorted(self.masses)]
         if not lumps:
             return jnp.eye(size)
-        places = [Attachment(lump.component, lump.node) for lump in lumps]
-        motions = point_rows(self.components, places, 0.0).reshape(-1, size)
+        moved = motions.rows([(lump.node, direction) for lump in lumps for direction in DIRECTIONS])
         values = [v for m in lumps for v in (m.mass, m.mass, m.mass, m.inertia_x, m.inertia_y, m.inertia_z)]
-        return jnp.eye(size) + (motions.T * jnp.stack(values)) @ motions
+        return jnp.eye(size) + (moved.T * jnp.stack(values)) @ moved
 
-    def _measured(self) -> dict[str, Attachment]:
-        """Places whose motion can be asked for, by name."""
-        found = {
-            node: Attachment(name, node) for name in sorted(self.components) for node in self.components[name].nodes
-        }
-        for joint in (self.joints[name] for name in sorted(self.joints)):
-            for place in (place for pair in joint.pairs for place in pair):
-                if place is not None and place.name is not None:
-                    found[place.name] = place
-        return found
+    def _nodes(self) -> tuple[str, ...]:
+        """Names of the nodes, then of the named points on rails."""
+        nodes = [node for name in sorted(self.components) for node in self.components[name].nodes]
+        pairs = [pair for name in sorted(self.joints) for pair in self.joints[name].pairs]
+        return (*nodes, *(place.name for pair in pairs for place in pair if place is not None and place.name))
 
-    def _rows(self, names: tuple[str, ...] | None) -> np.ndarray | slice:
-        if names is None:
-            return slice(None)
-        known = {name: i for i, name in enumerate(self.outputs)}
+    def _places(self, names: tuple[str, ...]) -> list[Row]:
+        nodes, places = self._nodes(), []
         for name in names:
-            if name not in known:
+            node, _, direction = name.rpartition(" ")
+            if node not in nodes or direction not in DIRECTIONS:
                 raise InputError(
-                    f"The machine has no node and direction {name!r}. Nodes: {', '.join(self._measured())}; directions: "
-                    f'{", ".join(DIRECTIONS)}; written as "{next(iter(known))}".'
+                    f"The machine has no node and direction {name!r}. Nodes: {', '.join(nodes)}; directions: "
+                    f"{', '.join(DIRECTIONS)}; written as '{(*nodes, 'N1')[0]} x'."
                 )
-        return np.asarray([known[name] for name in names], dtype=int)
+            places.append((node, direction))
+        return places

@@ -7,9 +7,7 @@ from jaxtyping import Array, ArrayLike, Complex, Float
 from twin._checks import InputError, finite, is_concrete, not_negative, require_x64
 
 
-def eigenvalue(
-    frequency: Float[ArrayLike, "..."], damping_ratio: Float[ArrayLike, "..."]
-) -> Complex[Array, "..."]:
+def eigenvalue(frequency: Float[ArrayLike, "..."], damping_ratio: Float[ArrayLike, "..."]) -> Complex[Array, "..."]:
     """Eigenvalue λ = -ζω + jω√(1-ζ²) of an oscillating mode, ω = 2πf.
 
     The two are broadcast: frequencies (simulated, 1) with the damping ratios (reference,) make the eigenvalues
@@ -111,8 +109,8 @@ def _relative(name: str, value: ArrayLike, reference: ArrayLike, unit: str) -> A
         np.broadcast_shapes(x.shape, x_ref.shape)
     except ValueError:
         raise InputError(
-            f"{name} has shape {x.shape}, but reference has {x_ref.shape}. Pair the modes first (`pair_modes`), so that "
-            "there is one value for each reference mode."
+            f"{name} has shape {x.shape}, but reference has {x_ref.shape}. Pair the modes first (`pair_modes`), so "
+            "that there is one value for each reference mode."
         ) from None
     defined = x_ref != 0
     safe = jnp.where(defined, x_ref, 1.0)

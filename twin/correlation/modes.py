@@ -1,6 +1,5 @@
 """MACXP between the modes of a model and those of a reference, at the outputs measured."""
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -65,7 +64,7 @@ def _damped(name: str, modes: Modes | DampedModes | ReferenceModes) -> None:
     bare = np.flatnonzero((frequency > 0) & (ratio <= 0))
     if bare.size:
         raise InputError(
-            f"{name} has {bare.size} modes that vibrate without damping (first mode {bare[0]}, {frequency[bare[0]]:g} Hz, "
-            f"damping ratio {ratio[bare[0]]:g}): MACXP is singular there. Give the model material damping, or the "
-            "measured modes their damping ratios."
+            f"{name} has {bare.size} modes that vibrate without damping (first mode {bare[0]}, "
+            f"{frequency[bare[0]]:g} Hz, damping ratio {ratio[bare[0]]:g}): MACXP is singular there. Give the model "
+            "material damping, or the measured modes their damping ratios."
         )

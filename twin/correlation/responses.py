@@ -28,8 +28,8 @@ def frac(
     Args:
         response: simulated responses (response, excitation, frequency); an `FRF`, or arrays of any number of axes.
         reference: the reference's. Of two `FRF`s the responses are matched by name, those of the reference.
-        axis: axis or axes summed over. -1, the frequency: one value for each FRF (response, excitation). 0: one value for
-            each excitation and frequency, then known as cross signature assurance criterion.
+        axis: axis or axes summed over. -1, the frequency: one value for each FRF (response, excitation). 0: one value
+            for each excitation and frequency, then known as cross signature assurance criterion.
 
     Returns:
         Values between 0 and 1, axes as the input's but for those summed; NaN where a response is zero throughout.
@@ -57,8 +57,8 @@ def csf(
     with it the damping. Never above the root of `frac`.
 
     The literature sums over the responses and gives a value for each frequency (`axis=0`). The default, one value for
-    each FRF, is what the tables of Ellinger and Zaeh hold: every CSF in them lies just below the root of the FRAC beside
-    it, as it must when both are sums over the same axis.
+    each FRF, is what the tables of Ellinger and Zaeh seem to hold: every CSF in them lies just below the root of the
+    FRAC beside it (or is equal but for rounding), as it must when both are sums over the same axis.
 
     Args:
         response: as `frac`.

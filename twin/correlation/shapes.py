@@ -7,11 +7,12 @@ from jaxtyping import Array, ArrayLike, Float, Inexact
 
 from twin._checks import InputError, finite, is_concrete, require_x64
 
+_Parts = tuple[Array, ...]
+"""Real part of shapes, and imaginary part if they have one."""
 
-def mac(
-    shapes: Inexact[ArrayLike, "rows ..."], reference: Inexact[ArrayLike, "rows ..."]
-) -> Float[Array, "..."]:
-    """Modal assurance criterion |φ₁ᴴφ₂|² / (φ₁ᴴφ₁ · φ₂ᴴφ₂): squared cosine between shapes, whatever their scale and phase.
+
+def mac(shapes: Inexact[ArrayLike, "rows ..."], reference: Inexact[ArrayLike, "rows ..."]) -> Float[Array, "..."]:
+    """Modal assurance criterion |φ₁ᴴφ₂|² / (φ₁ᴴφ₁ · φ₂ᴴφ₂): squared cosine of shapes, whatever their scale and phase.
 
     All pairs of two matrices, or one pair of two vectors; pairs in step by `jax.vmap(mac, (1, 1))`.
 
@@ -31,9 +32,8 @@ def mac(
     """
     first, second = _checked(shapes, reference)
     one, other = _unit(_columns(first)), _unit(_columns(second))
-    value = _squared(jnp.conj(one).T @ other)
-    both = _defined(one)[:, None] & _defined(other)[None, :]
-    return jnp.where(both, value, jnp.nan).reshape(first.shape[1:] + second.shape[1:])
+    defined = _defined(one)[:, None] & _defined(other)[None, :]
+    return jnp.where(defined, _products(one, other)[0], jnp.nan).reshape(first.shape[1:] + second.shape[1:])
 
 
 def macxp(
@@ -56,8 +56,8 @@ def macxp(
 
     Args:
         shapes: one shape (rows,) or one per column (rows, modes), real or complex.
-        eigenvalues: λ of each [rad/s], Re(λ) < 0: (modes,), or for each pair (modes, references); without the axis of an
-            argument that is one shape.
+        eigenvalues: λ of each [rad/s], Re(λ) < 0: (modes,), or for each pair (modes, references); without the axis of
+            an argument that is one shape.
         reference: shapes of the reference, in the same rows.
         reference_eigenvalues: λ of each [rad/s], (references,).
 
@@ -107,39 +107,63 @@ def marked_macxp(
     one, other = _unit(shapes), _unit(reference)
     damped, damped_ref = jnp.real(poles) < 0, jnp.real(poles_ref) < 0
     poles, poles_ref = jnp.where(damped, poles, -1.0), jnp.where(damped_ref, poles_ref, -1.0)
-    conjugate, plain = jnp.abs(jnp.conj(poles) + poles_ref), jnp.abs(poles + poles_ref)
-    if jnp.iscomplexobj(one) or jnp.iscomplexobj(other):
-        cross = (jnp.abs(jnp.conj(one).T @ other) / conjugate + jnp.abs(one.T @ other) / plain) ** 2
-    else:  # without |·|, which would hide the second derivative at orthogonal shapes
-        cross = (one.T @ other) ** 2 * (1 / conjugate + 1 / plain) ** 2
-    value = cross / (_own(one, poles.T).T * _own(other, poles_ref))  # eq. 4
+    real, real_ref = jnp.real(poles), jnp.real(poles_ref)
+    imag, imag_ref = jnp.imag(poles), jnp.imag(poles_ref)
+    conjugate = (real + real_ref) ** 2 + (imag - imag_ref) ** 2  # |λ₁* + λ₂|²
+    plain = (real + real_ref) ** 2 + (imag + imag_ref) ** 2  # |λ₁ + λ₂|²
+    hermitian, straight = _products(one, other)
+    if hermitian is straight:  # real shapes: without a root of them, which would hide the second derivative at zero
+        cross = hermitian * (1 / conjugate + 1 / plain + 2 / jnp.sqrt(conjugate * plain))
+    else:  # the square of the sum in eq. 4, with a root of the product of both terms only
+        cross = hermitian / conjugate + straight / plain + 2 * _root(hermitian * straight / (conjugate * plain))
+    value = cross / (_own(one, real, imag, 1) * _own(other, real_ref, imag_ref, 0))  # eq. 4
     defined = damped & damped_ref & _defined(one)[:, None] & _defined(other)[None, :]
     return jnp.where(defined, value, jnp.nan)
 
 
-def _own(shapes: Array, poles: Array) -> Array:
-    """φᴴφ/(2|Re λ|) + |φᵀφ|/(2|λ|) of unit shapes; poles (any, modes)."""
-    straight = jnp.abs(jnp.sum(shapes**2, axis=0)) if jnp.iscomplexobj(shapes) else jnp.sum(shapes**2, axis=0)
-    return jnp.sum(_squared(shapes), axis=0) / (-2 * jnp.real(poles)) + straight / (2 * jnp.abs(poles))
+def _own(unit: _Parts, real: Array, imag: Array, axis: int) -> Array:
+    """φᴴφ/(2|Re λ|) + |φᵀφ|/(2|λ|) of unit shapes."""
+    straight = 1.0
+    if len(unit) == 2:  # 1 for a standing wave, 0 for a travelling one
+        difference, mixed = jnp.sum(unit[0] ** 2 - unit[1] ** 2, axis=0), 2 * jnp.sum(unit[0] * unit[1], axis=0)
+        straight = jnp.expand_dims(_root(difference**2 + mixed**2), axis)
+    return 1 / (-2 * real) + straight / (2 * jnp.sqrt(real**2 + imag**2))
 
 
-def _unit(shapes: Array) -> Array:
-    """Shapes of unit length; one that is zero stays so, with finite derivatives."""
+def _products(one: _Parts, other: _Parts) -> tuple[Array, Array]:
+    """|φ₁ᴴφ₂|² and |φ₁ᵀφ₂|² of all pairs, from one real product; the same array twice for real shapes."""
+    cross = jnp.concatenate(one, axis=1).T @ jnp.concatenate(other, axis=1)
+    n, m = one[0].shape[1], other[0].shape[1]
+    squares = cross**2
+    if len(one) + len(other) == 2:
+        return squares, squares
+    if len(other) == 1:
+        both = squares[:n] + squares[n:]
+        return both, both
+    if len(one) == 1:
+        both = squares[:, :m] + squares[:, m:]
+        return both, both
+    rr, ri, ir, ii = cross[:n, :m], cross[:n, m:], cross[n:, :m], cross[n:, m:]
+    return (rr + ii) ** 2 + (ri - ir) ** 2, (rr - ii) ** 2 + (ri + ir) ** 2
+
+
+def _unit(shapes: Array) -> _Parts:
+    """Real and imaginary part of shapes of unit length; one that is zero stays so, with finite derivatives."""
+    parts = (jnp.real(shapes), jnp.imag(shapes)) if jnp.iscomplexobj(shapes) else (shapes,)
     # First by the largest entry, for squares of very small or large entries leave the range of numbers.
-    largest = jax.lax.stop_gradient(jnp.max(jnp.abs(shapes), axis=0))
-    shapes = shapes / jnp.where(largest > 0, largest, 1.0)
-    length = jnp.sum(_squared(shapes), axis=0)
-    return shapes / jnp.sqrt(jnp.where(length > 0, length, 1.0))
+    largest = jax.lax.stop_gradient(jnp.max(jnp.stack([jnp.max(jnp.abs(x), axis=0) for x in parts]), axis=0))
+    parts = tuple(x / jnp.where(largest > 0, largest, 1.0) for x in parts)
+    length = sum(jnp.sum(x**2, axis=0) for x in parts)
+    return tuple(x / jnp.sqrt(jnp.where(length > 0, length, 1.0)) for x in parts)
 
 
-def _defined(unit: Array) -> Array:
-    return jnp.any(unit != 0, axis=0)
+def _defined(unit: _Parts) -> Array:
+    return sum(jnp.any(x != 0, axis=0) for x in unit) > 0
 
 
-def _squared(values: Array) -> Array:
-    if jnp.iscomplexobj(values):
-        return jnp.real(values) ** 2 + jnp.imag(values) ** 2
-    return values**2
+def _root(square: Array) -> Array:
+    """Square root with derivative zero at zero."""
+    return jnp.where(square > 0, jnp.sqrt(jnp.where(square > 0, square, 1.0)), 0.0)
 
 
 def _columns(shapes: Array) -> Array:
@@ -155,8 +179,8 @@ def _checked(shapes: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:
         finite(name, array)
     if first.shape[0] != second.shape[0]:
         raise InputError(
-            f"shapes have {first.shape[0]} rows, but the reference has {second.shape[0]}. Take the rows measured in both, "
-            "in one order."
+            f"shapes have {first.shape[0]} rows, but the reference has {second.shape[0]}. Take the rows measured in "
+            "both, in one order."
         )
     return first, second
 
@@ -169,7 +193,7 @@ def _decaying(name: str, eigenvalues: ArrayLike) -> Array:
         if growing.size:
             raise InputError(
                 f"{name} must have negative real parts [rad/s], but {growing.size} of {array.size} have none (first at "
-                f"index {growing[0]}): MACXP is singular without damping. Give the modes the reference's damping ratios "
-                "with `eigenvalue`, and leave rigid-body modes out."
+                f"index {growing[0]}): MACXP is singular without damping. Give the modes the reference's damping "
+                "ratios with `eigenvalue`, and leave rigid-body modes out."
             )
     return array

@@ -44,8 +44,8 @@ class ReferenceModes(eqx.Module):
         modes = self.frequency.shape[-1]
         if self.damping_ratio.shape[-1] != modes or self.output_shapes.shape[-2:] != (len(self.outputs), modes):
             raise InputError(
-                f"{modes} frequencies go with {modes} damping ratios and shapes ({len(self.outputs)}, {modes}), one row "
-                f"for each name in outputs, but there are {self.damping_ratio.shape[-1]} damping ratios and shapes "
+                f"{modes} frequencies go with {modes} damping ratios and shapes ({len(self.outputs)}, {modes}), one "
+                f"row for each name in outputs, but there are {self.damping_ratio.shape[-1]} damping ratios and shapes "
                 f"{self.output_shapes.shape}."
             )
 

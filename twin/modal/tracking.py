@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from twin.modal._assignment import best_first
 from twin.modal.undamped import Modes
 
 
@@ -37,17 +38,7 @@ def track(modes: Modes, reference: Modes) -> Modes:
     Returns:
         The modes in the reference's order.
     """
-    alike = jax.lax.stop_gradient(likeness(modes, reference))
-    number = alike.shape[0]
-
-    def pair(_: Array, carry: tuple[Array, Array]) -> tuple[Array, Array]:
-        left, order = carry
-        row, column = jnp.unravel_index(jnp.argmax(left), left.shape)
-        return left.at[row].set(-1.0).at[:, column].set(-1.0), order.at[row].set(column)
-
-    # NaN would be the largest of all; modes that are NaN are paired last.
-    start = (jnp.nan_to_num(alike), jnp.zeros(number, dtype=int))
-    order = jax.lax.fori_loop(0, number, pair, start)[1]
+    order = best_first(likeness(modes, reference))
     shapes = modes.shapes[:, order]
     along = jnp.einsum("im,ij,jm->m", reference.shapes, reference.mass, shapes)
     sign = jax.lax.stop_gradient(jnp.where(along < 0, -1.0, 1.0))

@@ -40,7 +40,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     demo = commands.add_parser("demo", help="identify a simulated servo axis from noisy records")
     _add_run(demo, _demo, "out/demo")
-    reproduce = commands.add_parser("reproduce", help="repeat a published identification on its measured data")
+    reproduce = commands.add_parser("reproduce", help="repeat a published study, on measured data where there are any")
     studies = reproduce.add_subparsers(required=True, metavar="STUDY")
     emps = studies.add_parser("emps", help="EMPS ball-screw axis: inverse dynamics and output error")
     _add_run(emps, _emps, "out/emps")

@@ -27,7 +27,7 @@ def design_gain(
     max_evaluations: int = 20,
     tolerance: float = 1e-6,
 ) -> DesignResult:
-    """The gain with the smallest cost of eq. 22 within bounds, |err| sharp, in less runs than a sweep takes.
+    """The gain with the smallest cost of eq. 22 within bounds, |err| sharp, in fewer runs than a sweep takes.
 
     Error, energy and time are smooth in the gain; only |err| has a kink where the error changes its sign, and the best
     gain often lies there. The three are therefore computed with their derivatives at a few gains, interpolated, and the
@@ -47,16 +47,21 @@ def design_gain(
         The cycle with the best gain simulated. `evaluations` counts every simulation, each with its derivative.
 
     Raises:
-        InputError: 64-bit mode off, bounds that are not finite or not positive for the gain, less than two nodes or
-            more than max_evaluations, a path that is not in the cycle.
+        InputError: 64-bit mode off, bounds that are not finite or not positive for the gain, or that are no pair, an
+            objective that is none, fewer than two nodes or more than max_evaluations, a path that is not in the cycle.
 
     Source: cost and gain of Mauro et al., section 7; the search is ours.
     """
     require_x64()
-    if isinstance(gain, tuple):
-        if not (np.all(np.isfinite(gain)) and 0 < gain[0] < gain[1]):
+    if not isinstance(objective, GainObjective):
+        raise InputError(
+            f"objective must be a GainObjective, but is a {type(objective).__name__}. GainObjective.of_sweep makes one "
+            "from a sweep; fitting.optimal_design.design takes any function of the cycle."
+        )
+    if not isinstance(gain, Parameter):
+        if not _is_range(gain):
             raise InputError(
-                f"gain must be bounds (lower, upper) above zero in 1/s, but is {gain}. Exchange or change them."
+                f"gain must be bounds (lower, upper) above zero in 1/s, but is {gain!r}. Exchange or change them."
             )
         gain = Parameter(POSITION_GAIN, "1/s", float(gain[0]), float(gain[1]), scale="log")
     space = ParameterSpace([gain])
@@ -99,6 +104,15 @@ def design_gain(
         stop=found.stop,
         note=f"{failed} of the gains tried failed or did not reach the target." if failed else "",
     )
+
+
+def _is_range(bounds: object) -> bool:
+    """Whether these are two finite numbers above zero, the lower first."""
+    try:
+        low, high = (float(bound) for bound in bounds)  # pyright: ignore[reportGeneralTypeIssues]
+    except (TypeError, ValueError):
+        return False
+    return 0 < low < high < np.inf
 
 
 @eqx.filter_jit

@@ -47,6 +47,13 @@ def as_array(value: Any) -> Float[Array, "..."]:
     return jnp.asarray(value, dtype=jnp.float64)
 
 
+def single_number(name: str, value: Any) -> None:
+    """Raise where a text, a list or an array stands for a single number. Placeholders of tree transformations pass."""
+    if isinstance(value, str) or (not _unreadable(value) and np.ndim(value) > 0):
+        seen = repr(value) if isinstance(value, str) else f"an array of shape {np.shape(value)}"
+        raise InputError(f"{name} must be a single number in SI units, but is {seen}. Map over several by jax.vmap.")
+
+
 def finite(name: str, value: ArrayLike, unit: str = "") -> None:
     """Raise unless every entry is finite. Traced values pass: in a batch a bad sample is marked, not raised."""
     if _unreadable(value):

@@ -61,6 +61,7 @@ class DesignStudy:
                 "evaluations": self.alone.evaluations,
                 "k_v": 60 * self.alone[POSITION_GAIN],
                 "sweep_cost": self.sweep_cost,
+                "message": self.alone.message,
             },
         }
 

@@ -11,7 +11,7 @@ import numpy as np
 from fitting.identification.mauro_design import DesignStudy
 from fitting.identification.mauro_structure import Structure
 from fitting.identification.mauro_study import TableStudy
-from fitting.identification.mauro_table import REPEATED_GAIN, mauro_table
+from fitting.identification.mauro_table import OPTIMAL_GAIN, REPEATED_GAIN, mauro_table
 from fitting.plots import save_figure
 from fitting.plots_axis import plot_closed_loop, plot_spring_deformations, plot_time_response
 from fitting.plots_design import plot_trade_off
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-# Gain whose responses are drawn [1/min].
-_GAIN = 2725.0
-
 
 def draw_all(out: Path, structure: Structure, study: TableStudy, design: DesignStudy) -> None:
     """Draw figures 6 to 11 and the residuals of Table 1.
@@ -47,14 +44,14 @@ def draw_all(out: Path, structure: Structure, study: TableStudy, design: DesignS
     frequency = np.geomspace(1, 1000, 400)
     axes = None
     for rigid, label in ((False, "six degrees of freedom"), (True, "rigid axis")):
-        loop = twin.cycle(to_si(_GAIN, "1/min", "1/s"), rigid=rigid).loop
+        loop = twin.cycle(to_si(OPTIMAL_GAIN, "1/min", "1/s"), rigid=rigid).loop
         # In motion the friction only damps; at rest it would hold an axis that is asked for so little.
         moving = eqx.tree_at(lambda loop: loop.plant.friction, loop, ViscousFriction(twin.viscous))
         response = closed_loop_response(moving, frequency)
         axes = plot_closed_loop(response, label=label, axes=axes)
     assert axes is not None
     save_figure(axes[0].figure, out / "fig7_closed_loop.png")
-    cycle = twin.cycle(to_si(_GAIN, "1/min", "1/s"), rigid=False)
+    cycle = twin.cycle(to_si(OPTIMAL_GAIN, "1/min", "1/s"), rigid=False)
     save_figure(plot_time_response(_simulated(cycle), cycle.move)[0].figure, out / "fig8_time_response.png")
     save_figure(plot_spring_deformations(spring_deformations(structure.axis)).figure, out / "fig9_deformations.png")
     ax = plot_sweep(structure.support_sweep)

@@ -2,7 +2,7 @@
 
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from fitting.identification.mauro_table import mauro_table
 from fitting.json_file import write_json
 from twin.drives import PerSpring
 from twin.io.parameter_file import ParameterEntry, write_parameters
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def reproduce_mauro(out: Path) -> dict[str, Any]:
@@ -151,7 +154,7 @@ def summarise(structure: Structure, printed: PrintedCost, study: TableStudy, des
     }
 
 
-def table_of(study: TableStudy) -> "Any":
+def table_of(study: TableStudy) -> "pd.DataFrame":
     """Table 1, printed and simulated, in its units, as a pandas DataFrame.
 
     Args:
@@ -197,7 +200,7 @@ def tabulate(summary: dict[str, Any]) -> str:
         f"RMS over the rows: error {rms['error_um']:.1f} µm, energy {rms['energy_percent']:.2f} %, time "
         f"{rms['time_percent']:.3f} %; least cost at k_v = {summary['cost_optimum_k_v']:.0f} 1/min"
     )
-    lines.append(f"What the table sees: {summary['fit']['identifiability']}")
+    lines.append(f"What the table can and cannot see: {summary['fit']['identifiability']}")
     design = summary["design"]
     lines.append(
         f"Best gain by gradients: cost {design['gain_alone']['cost']:.4f} in {design['gain_alone']['evaluations']} "

@@ -69,7 +69,8 @@ class TableTwin(eqx.Module):
     jerk: Float[Array, ""] = eqx.field(converter=as_scalar)
     """Largest jerk of the move [m/s³]."""
     presliding: Float[Array, ""] = eqx.field(converter=as_scalar, default=_PRESLIDING)
-    """Angle over which friction turns around [rad]; the results no longer move where it is made smaller."""
+    """Angle over which friction turns around [rad]; half of it moves a static error by 3 µm at
+    most."""
 
     def six_degrees(self) -> BallScrewAxis:
         """The axis with its six degrees of freedom."""
@@ -146,8 +147,9 @@ def table_space() -> ParameterSpace:
 
 
 def table_start() -> TableTwin:
-    """Where the fit to Table 1 starts: the best of a search over some hundred starts, rounded.
+    """Where the fit to Table 1 starts: what the best of a search over some hundred starts was fitted to, rounded.
 
+    A fit from here confirms and judges it, and hardly moves: it is no evidence that a fit from elsewhere ends here.
     The problem has many local minima, as an axis that stops a little earlier or later is held by friction elsewhere.
     `multistart(TableResidual.of(), table_start(), table_space(), ...)` searches for others.
     """

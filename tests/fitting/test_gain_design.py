@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jaxtyping import TypeCheckError
 from positioning_cycles import CYCLE, GAIN, GAINS, OBJECTIVE
 
 from fitting.cycle_run import CycleRun
@@ -79,6 +80,11 @@ def test_derivatives_of_the_objective(gain):
 def test_bad_input():
     with pytest.raises(InputError, match="gain must be bounds"):
         design_gain(CYCLE, OBJECTIVE, (100.0, 10.0))
+    for no_pair in ((10.0,), (1.0, 2.0, 3.0), [np.nan, 10.0], "10", None):
+        with pytest.raises((InputError, TypeCheckError), match="gain"):
+            design_gain(CYCLE, OBJECTIVE, no_pair)  # pyright: ignore[reportArgumentType]
+    with pytest.raises((InputError, TypeCheckError), match="objective"):
+        design_gain(CYCLE, cycle_performance, (10.0, 100.0))  # pyright: ignore[reportArgumentType]
     with pytest.raises(InputError, match="Give finite ones"):
         design_gain(CYCLE, OBJECTIVE, Parameter("loop.controller.feedforward"))
     with pytest.raises(InputError, match="nodes must be from 2"):

@@ -76,6 +76,7 @@ def test_design(reproduced):
     design = reproduced[1]["design"]
     assert design["cost"] < -1.648
     assert design["gain_alone"]["evaluations"] <= 20
+    assert design["gain_alone"]["message"].startswith("Converged")
     assert design["gain_alone"]["cost"] <= design["gain_alone"]["sweep_cost"]
     assert all(value > -1e-6 for value in design["constraints"].values())
 

@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jaxtyping import TypeCheckError
 
 from twin._checks import InputError
 from twin.drives import (
@@ -106,6 +107,23 @@ def test_parts_refuse():
             spring_deformations(axis, mode)
         with pytest.raises(InputError, match="mode must be 1 to 5"):
             structural_damping(axis, 0.03, mode)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("shaft_diameter", "45 mm"),
+        ("shaft_diameter", np.array([0.04, 0.05])),
+        ("slide_mass", np.array([100.0, 200.0])),
+        ("damping_ratio", -0.1),
+        ("motor", None),
+        ("friction", None),
+        ("friction", 1.2),
+    ],
+)
+def test_what_is_no_value_for_the_catalogue_is_named(name, value):
+    with pytest.raises((InputError, TypeCheckError), match=name):
+        catalogue(**{name: value})
 
 
 def test_a_bad_sample_of_a_batch_is_marked():

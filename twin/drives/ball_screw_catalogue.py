@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import ArrayLike, Float
 
-from twin._checks import positive
+from twin._checks import InputError, not_negative, positive, single_number
 from twin.drives.ball_screw import BallScrewAxis
 from twin.drives.ball_screw_modes import structural_damping
 from twin.drives.dc_motor import DcMotor
@@ -69,10 +69,26 @@ def ball_screw_axis(
 
     Raises:
         InputError: a dimension, material constant, inertia, mass or stiffness that is not positive and finite, a lead
-            of zero, a nut beyond the screw, a damping ratio that is negative.
+            of zero, a nut beyond the screw, a damping ratio that is negative, more than one number for a value, a motor
+            that is no `DcMotor`, friction that is no law.
 
     Source: Mauro, Pastorelli, Mohtar (2014), section 5.
     """
+    if not isinstance(motor, DcMotor):
+        raise InputError(f"motor must be a DcMotor, the electrics of the motor, but is a {type(motor).__name__}.")
+    if not isinstance(friction, AbstractFriction):
+        raise InputError(
+            f"friction must be a friction law, but is a {type(friction).__name__}. Give one of twin.laws, "
+            "CoulombViscousFriction for instance."
+        )
+    numbers = {"shaft_diameter": shaft_diameter, "length": length, "lead": lead, "nut_position": nut_position}
+    numbers |= {"end_diameter": end_diameter, "end_length": end_length, "motor_inertia": motor_inertia}
+    numbers |= {"motor_shaft": motor_shaft, "coupling": coupling, "coupling_inertia": coupling_inertia}
+    numbers |= {"bearing": bearing, "support": support, "nut": nut, "flange": flange, "nut_mass": nut_mass}
+    numbers |= {"slide_mass": slide_mass, "damping_ratio": damping_ratio, "density": density}
+    numbers |= {"youngs_modulus": youngs_modulus, "shear_modulus": shear_modulus}
+    for name, value in numbers.items():
+        single_number(name, value)
     lengths = {"shaft_diameter": shaft_diameter, "length": length, "end_diameter": end_diameter}
     lengths |= {"end_length": end_length}
     for name, value in lengths.items():
@@ -82,6 +98,7 @@ def ball_screw_axis(
     positive("shear_modulus", shear_modulus, "N/m²")
     positive("motor_inertia", motor_inertia, "kg m²")
     positive("coupling_inertia", coupling_inertia, "kg m²")
+    not_negative("damping_ratio", damping_ratio)
     area, polar = jnp.pi / 4 * jnp.asarray(shaft_diameter) ** 2, jnp.pi / 32 * jnp.asarray(shaft_diameter) ** 4
     end_polar = jnp.pi / 32 * jnp.asarray(end_diameter) ** 4
     springs = ScrewSprings(

@@ -54,7 +54,7 @@ def structural_damping(
         nut_position: distance of the nut from the fixed bearing [m]; that at mid-stroke if not given.
 
     Raises:
-        InputError: a ratio that is negative, a mode that is not 1 to 5.
+        InputError: a ratio that is negative or not finite, a mode that is not 1 to 5, a nut outside the screw.
 
     Source: Mauro, Pastorelli, Mohtar (2014), eq. 21.
     """
@@ -74,7 +74,7 @@ def spring_deformations(
         nut_position: distance of the nut from the fixed bearing [m]; that at mid-stroke if not given.
 
     Raises:
-        InputError: a mode that is not 1 to 5.
+        InputError: a mode that is not 1 to 5, a nut outside the screw.
 
     Source: Mauro, Pastorelli, Mohtar (2014), Fig. 9.
     """
@@ -123,4 +123,4 @@ def _elastic(mode: int) -> int:
     if mode not in (1, 2, 3, 4, 5):
         raise InputError(f"mode must be 1 to 5, the elastic modes of six bodies, but is {mode!r}.")
     # Mode 0 is the rigid body.
-    return mode
+    return int(mode)

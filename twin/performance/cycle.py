@@ -21,8 +21,8 @@ class PositioningCycle(eqx.Module):
     fit or by a design.
 
     Raises:
-        InputError: times that do not increase, or do not cover the move and the window after it, or a window that is
-            not positive.
+        InputError: times that are no vector that increases, or do not cover the move and the window after it, or a
+            window that is not positive.
 
     Source: the reference cycle of Mauro et al., sections 6 and 7.
     """
@@ -39,8 +39,12 @@ class PositioningCycle(eqx.Module):
     """Time at the end over which the static error is averaged [s]."""
 
     def __check_init__(self):
+        if getattr(self.times, "ndim", 1) != 1:
+            raise InputError(f"times of the cycle must be a vector [s], but have shape {self.times.shape}.")
         increasing("times of the cycle", self.times, "s")
         positive("window of the cycle", self.window, "s")
+        if isinstance(self.move, JerkLimitedMove):
+            _check_cover(self.times, self.move, self.window)
 
     @staticmethod
     def create(
@@ -56,13 +60,16 @@ class PositioningCycle(eqx.Module):
             record: time between recorded samples, a multiple of the step [s].
 
         Raises:
-            InputError: a time that is not positive, or a record that is no multiple of the step.
+            InputError: a time that is not positive, a dwell shorter than the window of the static error (0.02 s), or a
+                record that is no multiple of the step.
         """
         for name, value in (("dwell", dwell), ("step", step), ("record", record)):
             positive(name, value, "s")
         substeps = round(record / step)
         if substeps < 1 or abs(substeps * step - record) > 1e-9 * record:
-            raise InputError(f"record must be a multiple of the step of {step:g} s, but is {record:g} s. Round it.")
+            raise InputError(
+                f"record must be a multiple of the step of {step:g} s, but is {record:g} s. Change either."
+            )
         samples = int(jnp.ceil((move.start_time + move.duration() + dwell) / record)) + 1
         return PositioningCycle(loop, move, record * jnp.arange(samples), ConstantSteps(substeps=substeps))
 
@@ -82,6 +89,18 @@ class PositioningCycle(eqx.Module):
         if limit is not None and voltage is not None and is_concrete(limit) and is_concrete(voltage):
             warn_at_limit(run.times, voltage, limit)
         return run
+
+
+def _check_cover(times: ArrayLike, move: JerkLimitedMove, window: ArrayLike) -> None:
+    """Raise where known times end before the move and the window after it; traced values pass."""
+    needed = move.start_time + move.duration() + window
+    if not (isinstance(times, Array) and is_concrete(times) and is_concrete(needed)):
+        return
+    if float(times[-1]) < float(needed) * (1 - 1e-9):
+        raise InputError(
+            f"times of the cycle end at {float(times[-1]):g} s, but the move and the window after it, over which the "
+            f"static error is averaged, end at {float(needed):g} s. Lengthen times or dwell, or shorten the window."
+        )
 
 
 def cycle_performance(

@@ -69,7 +69,7 @@ def test_derivatives():
 
 def test_voltage_limit_all_the_time_is_said():
     cycle = rigid_cycle(voltage_limit=0.02, integral_gain=0.0)
-    cycle = dataclasses.replace(cycle, times=cycle.times[20:200] - cycle.times[20])
+    cycle = dataclasses.replace(cycle, times=cycle.times[20:260] - cycle.times[20])
     cycle = eqx.tree_at(lambda c: c.move.start_position, cycle, jnp.asarray(0.5))
     with pytest.warns(UserWarning, match="voltage limit reached all the time"):
         cycle.simulate()
@@ -83,5 +83,11 @@ def test_bad_input():
         PositioningCycle.create(loop, move, dwell=-1.0)
     with pytest.raises(InputError, match="times of the cycle"):
         dataclasses.replace(rigid_cycle(), times=jnp.zeros(5))
+    with pytest.raises(InputError, match="must be a vector"):
+        dataclasses.replace(rigid_cycle(), times=jnp.zeros((3, 2)))
+    with pytest.raises(InputError, match="but the move and the window after it"):
+        dataclasses.replace(rigid_cycle(), times=rigid_cycle().times[:40])
+    with pytest.raises(InputError, match="Lengthen times or dwell"):
+        PositioningCycle.create(loop, move, dwell=1e-3)
     with pytest.raises(InputError, match="window"):
         dataclasses.replace(rigid_cycle(), window=0.0)

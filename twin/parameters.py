@@ -15,6 +15,8 @@ Model = TypeVar("Model")
 
 # Starts of tied parameters that agree to this are taken to be equal; they may come from different sums.
 _SAME = 1e-9
+# By which share a start may exceed its bounds: rounding of the logarithmic scale.
+_ROUNDING = 1e-12
 
 
 def _as_paths(value: Any) -> Any:
@@ -226,7 +228,9 @@ class ParameterSpace(eqx.Module):
         for parameter, value in zip(self.parameters, np.asarray(values), strict=True):
             if not np.isfinite(value):
                 raise InputError(f"The start of {parameter.path} is {value}. Give the model a finite value.")
-            inside = parameter.lower <= value <= parameter.upper
+            # A fit that ended on a bound comes back from its logarithm with rounding.
+            slack = _ROUNDING * abs(value)
+            inside = parameter.lower - slack <= value <= parameter.upper + slack
             if not inside or (parameter.scale == "log" and value <= 0):
                 raise InputError(
                     f"The start of {parameter.path} is {value:g} {parameter.unit}, outside its bounds "

@@ -3,7 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy import special
+
+from sensitivity._bootstrap import weighted, with_interval
 
 # Numbers held at once in the arrays of products.
 _BLOCK = 4_000_000
@@ -41,19 +42,6 @@ def normalised(values: np.ndarray) -> np.ndarray:
     return np.where(constant, 0.0, (values - mean) / np.where(constant, 1.0, deviation))
 
 
-def bootstrap_weights(n: int, resamples: int, seed: int) -> np.ndarray:
-    """Weights of the base points (1 + resamples, n): equal ones first, then how often each is drawn, as SALib draws.
-
-    Args:
-        n: base points.
-        resamples: bootstrap samples.
-        seed: seed, at least 1.
-    """
-    drawn = np.random.default_rng(seed).integers(n, size=(n, resamples))
-    counts = np.bincount((drawn + n * np.arange(resamples)).ravel(), minlength=n * resamples)
-    return np.vstack([np.ones(n), counts.reshape(resamples, n)]) / n
-
-
 def estimates(blocks: dict[str, np.ndarray], weights: np.ndarray, confidence: float) -> Estimates:
     """First-order, total and second-order indices with bootstrapped intervals.
 
@@ -70,32 +58,23 @@ def estimates(blocks: dict[str, np.ndarray], weights: np.ndarray, confidence: fl
     parts = []
     for start in range(0, outputs, width):
         part = {name: block[..., start : start + width] for name, block in blocks.items()}
-        parts.append(_of_some(part, weights, special.ndtri(0.5 + confidence / 2)))
+        parts.append(_of_some(part, weights, confidence))
     return Estimates(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def _of_some(blocks: dict[str, np.ndarray], weights: np.ndarray, quantile: float) -> Estimates:
+def _of_some(blocks: dict[str, np.ndarray], weights: np.ndarray, confidence: float) -> Estimates:
     a, b, ab = blocks["A"], blocks["B"], blocks["AB"]
     mean = weights @ (a + b) / 2
     variance = weights @ (a**2 + b**2) / 2 - mean**2
     some = variance > np.finfo(float).eps
     inverse = np.where(some, 1 / np.where(some, variance, 1.0), 0.0)[:, None]
-    first = _weighted(weights, b[:, None] * (ab - a[:, None])) * inverse
-    total = _weighted(weights, (a[:, None] - ab) ** 2) / 2 * inverse
+    first = weighted(weights, b[:, None] * (ab - a[:, None])) * inverse
+    total = weighted(weights, (a[:, None] - ab) ** 2) / 2 * inverse
     names, outputs = ab.shape[1:]
     wanted = names if "BA" in blocks else 0
     second, second_conf = np.full((2, outputs, wanted, wanted), np.nan)
     for j in range(wanted - 1):
         products = blocks["BA"][:, j, None] * ab[:, j + 1 :] - (a * b)[:, None]
-        pair = _weighted(weights, products) * inverse - first[:, j, None] - first[:, j + 1 :]
-        second[:, j, j + 1 :], second_conf[:, j, j + 1 :] = _interval(pair, quantile)
-    return Estimates(*_interval(first, quantile), *_interval(total, quantile), second, second_conf)
-
-
-def _weighted(weights: np.ndarray, products: np.ndarray) -> np.ndarray:
-    return (weights @ products.reshape(len(products), -1)).reshape(len(weights), *products.shape[1:])
-
-
-def _interval(drawn: np.ndarray, quantile: float) -> tuple[np.ndarray, np.ndarray]:
-    """Estimate and half width, (outputs, names) each, of estimates (1 + resamples, names, outputs)."""
-    return drawn[0].T, quantile * drawn[1:].std(axis=0, ddof=1).T
+        pair = weighted(weights, products) * inverse - first[:, j, None] - first[:, j + 1 :]
+        second[:, j, j + 1 :], second_conf[:, j, j + 1 :] = with_interval(pair, confidence)
+    return Estimates(*with_interval(first, confidence), *with_interval(total, confidence), second, second_conf)

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import ArrayLike, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from twin._checks import InputError, require_x64
 from twin.parameters import ParameterSpace
@@ -48,25 +48,42 @@ def evaluate(
         raise InputError(f"chunk must be at least 1, but is {chunk}.")
     chunk = min(chunk, rows.shape[0])
     parts = []
+    keys: tuple[Any, ...] = ()
     for start in range(0, rows.shape[0], chunk):
         part = rows[start : start + chunk]
         # The last chunk is filled up with its own first row: another shape would be compiled once more.
         full = np.concatenate([part, np.repeat(part[:1], chunk - len(part), axis=0)])
-        parts.append(jax.tree.map(np.asarray, _mapped(fn, space, model, jnp.asarray(full))))
-    return jax.tree.map(lambda *x: np.concatenate(x)[: rows.shape[0]], *parts)
+        done, keys = _mapped(fn, space, model, jnp.asarray(full))
+        parts.append(jax.tree.map(np.asarray, done))
+    found = jax.tree.map(lambda *x: np.concatenate(x)[: rows.shape[0]], *parts)
+    return dict(zip(keys, found, strict=True)) if keys else found
 
 
 @eqx.filter_jit
-def _mapped(fn: Callable[..., Any], space: ParameterSpace, model: Any, rows: Float[ArrayLike, "rows n"]) -> Any:
-    return jax.vmap(lambda row: fn(row if model is None else space.with_values(model, row)))(rows)
+def _mapped(
+    fn: Callable[..., Any], space: ParameterSpace, model: Any, rows: Float[Array, "rows n"]
+) -> tuple[Any, tuple[Any, ...]]:
+    keys: tuple[Any, ...] = ()
+
+    def one(row: Float[Array, "n"]) -> Any:
+        nonlocal keys
+        done = fn(row if model is None else space.with_values(model, row))
+        if not isinstance(done, Mapping):
+            return done
+        # JAX sorts the keys of a dict, but names were given in the order of the caller.
+        keys = tuple(done)
+        return list(done.values())
+
+    return jax.vmap(one)(rows), keys
 
 
-def named_columns(values: Any, outputs: Sequence[str] | None) -> tuple[np.ndarray, tuple[str, ...]]:
+def named_columns(values: Any, outputs: Sequence[str] | None, rows: int) -> tuple[np.ndarray, tuple[str, ...]]:
     """Outputs as one matrix, and their names.
 
     Args:
         values: (rows,), (rows, outputs), or a dict of such; an entry with several columns is numbered from 0.
         outputs: names; None for those of the dict, or else "0", "1" and so on.
+        rows: number of samples.
 
     Returns:
         Matrix (rows, outputs), and as many names.
@@ -77,16 +94,13 @@ def named_columns(values: Any, outputs: Sequence[str] | None) -> tuple[np.ndarra
     if isinstance(values, Mapping):
         columns, names = [], []
         for key, entry in values.items():
-            column = _matrix(entry, str(key))
+            column = _matrix(entry, str(key), rows)
             wide = np.ndim(entry) > 1
             columns.append(column)
             names += [f"{key} {i}" for i in range(column.shape[1])] if wide else [str(key)]
-        if len({c.shape[0] for c in columns}) != 1:
-            shown = ", ".join(f"{key}: {c.shape[0]}" for key, c in zip(values, columns, strict=True))
-            raise InputError(f"All outputs must have as many rows as there are samples, but they have {shown}.")
         matrix = np.concatenate(columns, axis=1)
     else:
-        matrix = _matrix(values, "values")
+        matrix = _matrix(values, "values", rows)
         names = [str(i) for i in range(matrix.shape[1])]
     names = tuple(names if outputs is None else outputs)
     if len(names) != matrix.shape[1]:
@@ -97,12 +111,12 @@ def named_columns(values: Any, outputs: Sequence[str] | None) -> tuple[np.ndarra
     return matrix, names
 
 
-def _matrix(values: Any, name: str) -> np.ndarray:
+def _matrix(values: Any, name: str, rows: int) -> np.ndarray:
     array = np.asarray(values)
-    if array.ndim not in (1, 2) or array.size == 0:
+    if array.ndim not in (1, 2) or array.size == 0 or array.shape[0] != rows:
         raise InputError(
-            f"{name} has the shape {array.shape}, but one row per sample and one column per output were expected. "
-            "Return a number or a vector for each sample."
+            f"{name} has the shape {array.shape}, but {rows} rows were expected, one per sample in order, and one "
+            "column per output. Return a number, a vector, or a dict of such for each sample."
         )
     if not (np.issubdtype(array.dtype, np.number) or array.dtype == bool) or np.iscomplexobj(array):
         raise InputError(

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from sensitivity._estimators import Estimates, bootstrap_weights, estimates, normalised
+from sensitivity._bootstrap import bootstrap_weights, require_interval
+from sensitivity._estimators import Estimates, estimates, normalised
 from sensitivity.evaluation import evaluate, named_columns, require_finite
 from sensitivity.sobol_design import SobolSamples, sobol_samples
 from sensitivity.sobol_result import SobolIndices
-from twin._checks import InputError
 from twin.parameters import ParameterSpace
 
 # Fewest base points that an earlier estimate of a run is made from.
@@ -84,15 +84,8 @@ def sobol_indices(
         A. Saltelli et al., Computer Physics Communications 181 (2010) 259-270 (first order and total).
         A. Saltelli, Computer Physics Communications 145 (2002) 280-297 (second order).
     """
-    matrix, names = named_columns(values, outputs)
-    if len(matrix) != len(samples):
-        raise InputError(
-            f"values has {len(matrix)} rows, but there are {len(samples)} samples. Evaluate each sample once, in order."
-        )
-    if not 0 < confidence < 1:
-        raise InputError(f"confidence must be between 0 and 1, but is {confidence}. For 95 % give 0.95.")
-    if resamples < 2:
-        raise InputError(f"resamples must be at least 2, but is {resamples}. 100 is usual.")
+    matrix, names = named_columns(values, outputs, len(samples))
+    require_interval(confidence, resamples)
     require_finite(matrix, names, samples.space, samples.values)
     sizes = [samples.n // k for k in (8, 4, 2, 1) if samples.n // k >= _FEWEST]
     found = [_first(samples, matrix, size, confidence, resamples) for size in sizes]

@@ -135,12 +135,7 @@ def sobol_samples(
     """
     require_bounds(space)
     require_seed(seed)
-    if n < 8 or n & (n - 1):
-        lower = 2 ** max(3, int(n).bit_length() - 1)
-        raise InputError(
-            f"n must be a power of two of at least 8, but is {n}: a Sobol sequence is balanced only there. "
-            f"Take {lower} or {2 * lower}."
-        )
+    require_power_of_two(n)
     membership = _membership(space, groups)
     from SALib.sample import sobol as salib
 
@@ -194,6 +189,23 @@ def require_seed(seed: int) -> None:
     """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 1:
         raise InputError(f"seed must be a whole number of at least 1, but is {seed!r}. SALib takes 0 for no seed.")
+
+
+def require_power_of_two(n: int) -> None:
+    """Raise unless a number of points is a power of two of at least 8.
+
+    Args:
+        n: points.
+
+    Raises:
+        InputError: with the neighbouring powers.
+    """
+    if n < 8 or n & (n - 1):
+        lower = 2 ** max(3, int(n).bit_length() - 1)
+        raise InputError(
+            f"n must be a power of two of at least 8, but is {n}: a Sobol sequence is balanced only there. "
+            f"Take {lower} or {2 * lower}."
+        )
 
 
 def _membership(space: ParameterSpace, groups: Mapping[str, Sequence[str]] | None) -> tuple[str, ...]:

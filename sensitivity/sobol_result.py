@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sensitivity._tables import long_table, number_of, shown_html, shown_text
 from twin._checks import InputError
 from twin.io.npz_file import NpzFile
 from twin.parameters import ParameterSpace
@@ -102,12 +103,7 @@ class SobolIndices:
         Raises:
             InputError: no such output.
         """
-        if isinstance(output, str) and output in self.outputs:
-            return self.outputs.index(output)
-        if isinstance(output, int | np.integer) and -len(self.outputs) <= output < len(self.outputs):
-            return int(output) % len(self.outputs)
-        shown = ", ".join(self.outputs[:8]) + (", ..." if len(self.outputs) > 8 else "")
-        raise InputError(f"No output {output!r}; there are {len(self.outputs)}: {shown}.")
+        return number_of(output, self.outputs)
 
     def at(self, size: int) -> "SobolIndices":
         """The study as it stood after the first base points, without second-order indices.
@@ -127,11 +123,8 @@ class SobolIndices:
 
     def to_dataframe(self) -> "pd.DataFrame":
         """Indices and half widths, one row per output and parameter."""
-        import pandas as pd
-
-        rows = pd.MultiIndex.from_product([self.outputs, self.names], names=["output", "parameter"])
-        columns = ("S1", "S1_conf", "ST", "ST_conf")
-        return pd.DataFrame({name: getattr(self, name).ravel() for name in columns}, index=rows)
+        columns = {name: getattr(self, name) for name in ("S1", "S1_conf", "ST", "ST_conf")}
+        return long_table(self.outputs, self.names, columns)
 
     def second_order_dataframe(self) -> "pd.DataFrame":
         """Second-order indices and half widths, one row per output and pair of parameters.
@@ -172,12 +165,10 @@ class SobolIndices:
         return cls(**found)
 
     def _repr_html_(self) -> str:
-        table = self.to_dataframe().to_html(float_format=lambda x: f"{x:.4f}", max_rows=60)
-        return f"<div><p><b>Sobol indices</b>: {self._facts()}.</p>{table}</div>"
+        return shown_html(self.to_dataframe(), "Sobol indices", self._facts())
 
     def __repr__(self) -> str:
-        table = self.to_dataframe().to_string(float_format=lambda x: f"{x:.4f}", max_rows=60)
-        return f"{table}\nSobol indices: {self._facts()}."
+        return shown_text(self.to_dataframe(), "Sobol indices", self._facts())
 
     def _facts(self) -> str:
         still = int(np.sum(self.variance == 0))

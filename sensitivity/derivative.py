@@ -10,9 +10,9 @@ from jaxtyping import Array, Float
 
 from sensitivity._bootstrap import bootstrap_weights, require_interval, weighted, with_interval
 from sensitivity._estimators import normalised
+from sensitivity._unit_cube import from_unit, require_bounds, require_power_of_two, require_seed
 from sensitivity.derivative_result import DerivativeMeasures
 from sensitivity.evaluation import evaluate, named_columns, require_finite
-from sensitivity.sobol_design import from_unit, require_bounds, require_power_of_two, require_seed
 from twin._checks import InputError
 from twin.parameters import ParameterSpace
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from sensitivity._bootstrap import bootstrap_weights, require_interval, weighted, with_interval
 from sensitivity._tables import long_table, number_of, shown_html, shown_text
+from sensitivity._unit_cube import from_unit, require_bounds, require_seed
 from sensitivity.evaluation import evaluate, named_columns, require_finite
-from sensitivity.sobol_design import from_unit, require_bounds, require_seed
 from twin._checks import InputError
 from twin.io.npz_file import NpzFile
 from twin.parameters import ParameterSpace

@@ -77,25 +77,26 @@ class Partition:
         """One row per output: how many parameters are searched, and the names in each class, strongest first."""
         import pandas as pd
 
-        rows = []
-        for i in range(len(self.outputs)):
-            order = np.argsort(-self.indices.ST[i], kind="stable")
-            named = {
-                verdict: ", ".join(self.names[k] for k in order if self.verdict[i, k] == verdict)
-                for verdict in (IN, UNDECIDED)
-            }
-            rows.append({"searched": len(self.searched(i)), **named})
+        rows = [
+            {"searched": len(self.searched(i)), IN: self._named(i, IN), UNDECIDED: self._named(i, UNDECIDED)}
+            for i in range(len(self.outputs))
+        ]
         return pd.DataFrame(rows, index=pd.Index(self.outputs, name="output"))
 
     def _repr_html_(self) -> str:
         return f"<div><p><b>Partition</b>: {self._facts()}</p>{self.summary().to_html(max_rows=60)}</div>"
 
     def __repr__(self) -> str:
-        lines = [
-            f"{output}: {row[IN] or '-'}" + (f" (undecided: {row[UNDECIDED]})" if row[UNDECIDED] else "")
-            for output, row in self.summary().iterrows()
-        ]
+        lines = []
+        for i, output in enumerate(self.outputs):
+            undecided = self._named(i, UNDECIDED)
+            lines.append(f"{output}: {self._named(i, IN) or '-'}" + (f" (undecided: {undecided})" if undecided else ""))
         return "\n".join([*lines, f"Partition: {self._facts()}"])
+
+    def _named(self, row: int, verdict: str) -> str:
+        """Names of one class, strongest first."""
+        order = np.argsort(-self.indices.ST[row], kind="stable")
+        return ", ".join(self.names[k] for k in order if self.verdict[row, k] == verdict)
 
     def _facts(self) -> str:
         count = np.asarray(list(self.searched_per_problem.values()))

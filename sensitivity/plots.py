@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _FIRST, _TOTAL = "#9ecae1", "#08519c"
+# Share of the largest effect under which points lie on top of each other.
+_CROWD = 0.1
 
 
 def plot_indices(
@@ -140,7 +142,7 @@ def plot_convergence(
     ax.set_xlabel("base points n")
     ax.set_ylabel("total effect $S_{Ti}$ [-]" if total else "first-order index $S_i$ [-]")
     ax.set_title(indices.outputs[row], fontsize="medium")
-    ax.legend(fontsize="small")
+    ax.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
     ax.grid(True, alpha=0.3)
     return ax
 
@@ -154,7 +156,7 @@ def plot_effects(
     Args:
         effects: Morris study.
         output: name or number of the output.
-        top: most parameters named, by μ*.
+        top: most parameters named, by μ*; the crowd near the origin is not.
         unit: unit of the output, for the axes.
         ax: axes to draw in; new ones if not given.
     """
@@ -162,8 +164,11 @@ def plot_effects(
     row = effects.index(output)
     x, y = effects.mu_star[row], effects.sigma[row]
     ax.errorbar(x, y, effects.sigma_conf[row], effects.mu_star_conf[row], fmt="o", ms=4, lw=0.8, color=_TOTAL)
-    for k in _strongest(x, top):
-        ax.annotate(effects.names[k], (x[k], y[k]), (4, 4), textcoords="offset points", fontsize="x-small")
+    named = [k for k in _strongest(x, top) if x[k] > _CROWD * x.max()]
+    for i, k in enumerate(named):
+        # In turn above and below the point: neighbours' names would cover each other.
+        shift = (4, -10) if i % 2 else (4, 4)
+        ax.annotate(effects.names[k], (x[k], y[k]), shift, textcoords="offset points", fontsize="x-small")
     end = 1.08 * float(np.max([x + effects.mu_star_conf[row], y + effects.sigma_conf[row]], initial=0.0)) or 1.0
     ax.plot([0, end], [0, end], color="0.6", lw=0.8, ls="--", label="σ = μ*")
     ax.set_xlim(0, end)

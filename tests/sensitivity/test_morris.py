@@ -7,7 +7,7 @@ from SALib.analyze import morris as analysis
 from SALib.sample import morris as sampler
 
 from sensitivity import ElementaryEffects, evaluate, morris
-from sensitivity.sobol_design import from_unit
+from sensitivity._unit_cube import from_unit
 from tests.sensitivity_functions import ISHIGAMI, LINEAR, SLOPES, ishigami, linear
 from twin.parameters import Parameter, ParameterSpace
 

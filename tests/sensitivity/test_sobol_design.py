@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from jaxtyping import Array, Float
 
-from sensitivity import evaluate, sobol, sobol_indices, sobol_samples
+from sensitivity import SobolSamples, derivative_measures, evaluate, sobol, sobol_indices, sobol_samples
 from twin._checks import as_scalar
 from twin.parameters import Parameter, ParameterSpace
 
@@ -97,3 +97,30 @@ def test_second_order_of_a_product():
     table = found.second_order_dataframe()["S2"]
     assert table.loc[("0", "x", "y")] == pytest.approx(1.0, abs=0.1)
     assert table.loc[("0", "x", "z")] == pytest.approx(0.0, abs=0.05)
+
+
+def test_a_function_is_traced_once():
+    """Studies that are repeated with another seed, or a last chunk that is not full, compile nothing (trap 35)."""
+    traces = []
+
+    def counted(x):
+        traces.append(1)
+        return x[0] * x[1]
+
+    for seed in (1, 2, 3):
+        sobol(counted, SPACE, n=16, seed=seed, chunk=32)
+    assert len(traces) == 1
+    derivative_measures(counted, SPACE, n=16, seed=1)
+    first = len(traces)
+    derivative_measures(counted, SPACE, n=16, seed=2)
+    assert len(traces) == first
+
+
+@pytest.mark.parametrize("second_order", [False, True])
+def test_the_design_is_kept_with_the_study(tmp_path, second_order):
+    samples = sobol_samples(SPACE, 16, seed=2, second_order=second_order, groups={"body": ["mass", "damping"]})
+    samples.save(tmp_path / "design")
+    loaded = SobolSamples.load(tmp_path / "design.npz")
+    np.testing.assert_array_equal(loaded.values, samples.values)
+    assert (loaded.n, loaded.seed, loaded.groups, loaded.space) == (16, 2, samples.groups, SPACE)
+    np.testing.assert_array_equal(loaded.distinct("mass").back, samples.distinct("mass").back)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fitting.npz_file import NpzFile
 from twin._checks import InputError
+from twin.io.npz_file import NpzFile
 from twin.parameters import ParameterSpace
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from scipy import stats
 
-from fitting.npz_file import NpzFile
 from fitting.solvers.stop import CONVERGED, Stop
 from twin._checks import InputError
+from twin.io.npz_file import NpzFile
 from twin.parameters import ParameterSpace
 
 if TYPE_CHECKING:

@@ -96,6 +96,7 @@ def test_importing_changes_and_loads_nothing():
         "import sys, jax; before = jax.config.jax_enable_x64\n"
         "import twin.simulation, twin.drives, twin.control, twin.linear\n"
         "import fitting.fit, fitting.identification.output_error\n"
+        "import sensitivity, sensitivity.plots\n"
         "assert jax.config.jax_enable_x64 == before\n"
         "assert not {'matplotlib', 'pandas', 'SALib', 'pint', 'pooch', 'tomlkit'} & set(sys.modules)\n"
     )

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import ArrayLike, Float
+from jaxtyping import ArrayLike
 
 from twin._checks import InputError, finite, not_negative, positive, require_x64
 from twin.structure.component import Component
@@ -13,13 +13,13 @@ from twin.structure.rail import Rail
 
 
 def component_from_modes(
-    frequency: Float[ArrayLike, "..."],
-    shapes: Float[ArrayLike, "..."],
+    frequency: ArrayLike | list | tuple,
+    shapes: ArrayLike | list | tuple,
     nodes: Sequence[str],
-    positions: Float[ArrayLike, "..."],
+    positions: ArrayLike | list | tuple,
     *,
     directions: Sequence[str] = DIRECTIONS,
-    modal_mass: Float[ArrayLike, "..."] | None = None,
+    modal_mass: ArrayLike | list | tuple | None = None,
     modes: int | None = None,
     loss_factor: float = 0.0,
     rails: Mapping[str, tuple[Any, Any]] | None = None,
@@ -94,7 +94,7 @@ def component_modes(
     mass: Any,
     stiffness: Any,
     nodes: Sequence[str],
-    positions: Float[ArrayLike, "..."],
+    positions: ArrayLike | list | tuple,
     dofs: Any,
     *,
     below: float,

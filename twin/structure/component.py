@@ -45,15 +45,15 @@ class Component(eqx.Module):
 
     def __init__(
         self,
-        eigenvalues: Float[ArrayLike, "modes"],
-        shapes: Float[ArrayLike, "..."],
-        positions: Float[ArrayLike, "..."],
+        eigenvalues: ArrayLike | list | tuple,
+        shapes: ArrayLike | list | tuple,
+        positions: ArrayLike | list | tuple,
         nodes: tuple[str, ...],
         *,
-        loss_factor: Float[ArrayLike, ""] = 0.0,
-        density: Float[ArrayLike, ""] = 1.0,
-        modulus: Float[ArrayLike, ""] = 1.0,
-        frequency: Float[ArrayLike, "modes"] | None = None,
+        loss_factor: ArrayLike = 0.0,
+        density: ArrayLike = 1.0,
+        modulus: ArrayLike = 1.0,
+        frequency: ArrayLike | list | tuple | None = None,
         rails: Mapping[str, Rail] | None = None,
         directions: tuple[str, ...] = DIRECTIONS,
     ):

@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from twin._checks import InputError, finite
+from twin._checks import InputError, as_scalar, finite, is_concrete
 from twin.linear import SecondOrder
 from twin.structure._check_machine import check_machine
 from twin.structure.component import Component
@@ -55,7 +55,7 @@ class Machine(eqx.Module):
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names "node direction" of what can be measured or excited: at the nodes, then at named points on rails."""
-        return tuple(f"{name} {direction}" for name in self._nodes() for direction in DIRECTIONS)
+        return tuple(f"{name} {direction}" for name in _nodes(self) for direction in DIRECTIONS)
 
     def second_order(
         self,
@@ -80,28 +80,12 @@ class Machine(eqx.Module):
         Raises:
             InputError: 64-bit mode off, a position off a rail or not finite, an unknown input or output.
         """
-        finite("position", position, "m")
-        motions = Motions(self.components, self.joints, position)
-        joined = connect(self.joints, motions)
-        parts = [self.components[name] for name in sorted(self.components)]
-        own = jnp.concatenate([part.own_eigenvalues for part in parts])
-        lost = jnp.concatenate([part.loss_factor * part.own_eigenvalues for part in parts])
-
-        def coupled(diagonal: Array, values: Array) -> Array:
-            return jnp.diag(diagonal) + (joined.vectors * values) @ joined.vectors.T
-
-        excited = self.outputs if inputs is None else tuple(inputs)
-        measured = self.outputs if outputs is None else tuple(outputs)
-        return SecondOrder(
-            mass=self._mass(motions, own.size),
-            viscous=coupled(jnp.zeros_like(own), joined.viscous),
-            hysteretic=coupled(lost, joined.hysteretic),
-            stiffness=coupled(own, joined.stiffness),
-            input_map=motions.rows(self._places(excited)).T,
-            output_map=motions.rows(self._places(measured)),
-            inputs=excited,
-            outputs=measured,
-        )
+        _check_position(self, position)
+        nodes, everything = _nodes(self), self.outputs
+        excited = everything if inputs is None else tuple(inputs)
+        measured = everything if outputs is None else tuple(outputs)
+        matrices = _matrices(self, as_scalar(position), _places(nodes, excited), _places(nodes, measured))
+        return SecondOrder(*matrices, inputs=excited, outputs=measured)
 
     def connections(self, position: Float[ArrayLike, ""] = 0.0) -> Connections:
         """The joints' springs and dampers at an axis position, in the coordinates of `second_order`.
@@ -112,30 +96,67 @@ class Machine(eqx.Module):
         Raises:
             InputError: a position off a rail.
         """
-        return connect(self.joints, Motions(self.components, self.joints, position))
+        _check_position(self, position)
+        return _connections(self, as_scalar(position))
 
-    def _mass(self, motions: Motions, size: int) -> Float[Array, "dofs dofs"]:
-        lumps = [self.masses[name] for name in sorted(self.masses)]
-        if not lumps:
-            return jnp.eye(size)
-        moved = motions.rows([(lump.node, direction) for lump in lumps for direction in DIRECTIONS])
-        values = [v for m in lumps for v in (m.mass, m.mass, m.mass, m.inertia_x, m.inertia_y, m.inertia_z)]
-        return jnp.eye(size) + (moved.T * jnp.stack(values)) @ moved
 
-    def _nodes(self) -> tuple[str, ...]:
-        """Names of the nodes, then of the named points on rails."""
-        nodes = [node for name in sorted(self.components) for node in self.components[name].nodes]
-        pairs = [pair for name in sorted(self.joints) for pair in self.joints[name].pairs]
-        return (*nodes, *(place.name for pair in pairs for place in pair if place is not None and place.name))
+# Compiled as one piece: operation by operation, outside of compiled code, a machine takes a hundred times longer.
+@eqx.filter_jit
+def _connections(machine: Machine, position: Float[Array, ""]) -> Connections:
+    return connect(machine.joints, Motions(machine.components, machine.joints, position))
 
-    def _places(self, names: tuple[str, ...]) -> list[Row]:
-        nodes, places = self._nodes(), []
-        for name in names:
-            node, _, direction = name.rpartition(" ")
-            if node not in nodes or direction not in DIRECTIONS:
-                raise InputError(
-                    f"The machine has no node and direction {name!r}. Nodes: {', '.join(nodes)}; directions: "
-                    f"{', '.join(DIRECTIONS)}; written as '{(*nodes, 'N1')[0]} x'."
-                )
-            places.append((node, direction))
-        return places
+
+@eqx.filter_jit
+def _matrices(
+    machine: Machine, position: Float[Array, ""], excited: tuple[Row, ...], measured: tuple[Row, ...]
+) -> tuple[Array, ...]:
+    """M, C, D, K, input and output map."""
+    motions = Motions(machine.components, machine.joints, position)
+    joined = connect(machine.joints, motions)
+    parts = [machine.components[name] for name in sorted(machine.components)]
+    own = jnp.concatenate([part.own_eigenvalues for part in parts])
+    lost = jnp.concatenate([part.loss_factor * part.own_eigenvalues for part in parts])
+
+    def coupled(diagonal: Array, vectors: Array, values: Array) -> Array:
+        return jnp.diag(diagonal) + (vectors * values) @ vectors.T
+
+    lumps = [machine.masses[name] for name in sorted(machine.masses)]
+    moved = motions.rows([(lump.node, direction) for lump in lumps for direction in DIRECTIONS]).T
+    weights = [v for m in lumps for v in (m.mass, m.mass, m.mass, m.inertia_x, m.inertia_y, m.inertia_z)]
+    return (
+        coupled(jnp.ones_like(own), moved, jnp.stack(weights) if weights else jnp.zeros(0)),
+        coupled(jnp.zeros_like(own), joined.vectors, joined.viscous),
+        coupled(lost, joined.vectors, joined.hysteretic),
+        coupled(own, joined.vectors, joined.stiffness),
+        motions.rows(excited).T,
+        motions.rows(measured),
+    )
+
+
+def _check_position(machine: Machine, position: ArrayLike) -> None:
+    finite("position", position, "m")
+    for joint in machine.joints.values():
+        for place in (place for pair in joint.pairs for place in pair):
+            if place is not None and place.rail is not None and is_concrete(position):
+                rail = machine.components[place.component].rails[place.rail]
+                rail.check(place.offset + position, f"rail {place.rail!r} of component {place.component!r}")
+
+
+def _nodes(machine: Machine) -> tuple[str, ...]:
+    """Names of the nodes, then of the named points on rails."""
+    nodes = [node for name in sorted(machine.components) for node in machine.components[name].nodes]
+    pairs = [pair for name in sorted(machine.joints) for pair in machine.joints[name].pairs]
+    return (*nodes, *(place.name for pair in pairs for place in pair if place is not None and place.name))
+
+
+def _places(nodes: tuple[str, ...], names: tuple[str, ...]) -> tuple[Row, ...]:
+    places = []
+    for name in names:
+        node, _, direction = name.rpartition(" ")
+        if node not in nodes or direction not in DIRECTIONS:
+            raise InputError(
+                f"The machine has no node and direction {name!r}. Nodes: {', '.join(nodes)}; directions: "
+                f"{', '.join(DIRECTIONS)}; written as '{(*nodes, 'N1')[0]} x'."
+            )
+        places.append((node, direction))
+    return tuple(places)

@@ -28,37 +28,37 @@ MODES = 20
 
 LOSS_FACTOR = {"bed": 0.004, "table": 0.004, "screw": 0.003, "x_rotor": 0.003, "z_rotor": 0.003}
 """Chosen: material damping of the components [-]."""
-JOINT_LOSS_FACTOR = 0.005
+JOINT_LOSS_FACTOR = 0.008
 """Chosen, known: hysteretic damping of all joints but the mounting elements, as a share of their stiffness [-]."""
 MOUNTING = (
-    {"stiffness": (4.0e7, 7.0e7, 3.2e7), "viscous": (2.0e4, 1.6e4), "hysteretic": 7.0e6},
-    {"stiffness": (3.0e7, 5.5e7, 4.2e7), "viscous": (1.6e4, 2.2e4), "hysteretic": 5.5e6},
-    {"stiffness": (3.6e7, 4.6e7, 2.6e7), "viscous": (1.4e4, 1.3e4), "hysteretic": 4.0e6},
+    {"stiffness": (4.0e7, 8.0e7, 3.2e7), "viscous": (1.7e4, 8.0e3), "hysteretic": 8.0e6},
+    {"stiffness": (3.0e7, 7.0e7, 4.2e7), "viscous": (2.6e4, 2.2e4), "hysteretic": 6.5e6},
+    {"stiffness": (4.0e7, 6.0e7, 2.6e7), "viscous": (2.0e4, 1.4e4), "hysteretic": 5.0e6},
 )
 """Chosen: mounting elements 1 to 3: k_x, k_y, k_z [N/m], b_x, b_z [Ns/m], d_y [N/m]."""
 MOUNTING_REST = (2e4, 2e4, 1e4)
 """Chosen, known: stiffness of every mounting element about x, y, z [Nm/rad]."""
-FIXED_BEARING = {"x": 3.5e8, "y": 3.0e8, "z": 2.2e8, "rx": 4e5, "ry": 3.4e5}
+FIXED_BEARING = {"x": 5.0e8, "y": 4.5e8, "z": 2.2e8, "rx": 4e5, "ry": 3.4e5}
 """Chosen: fixed bearing [N/m, Nm/rad]; its k_z is unknown."""
-LOOSE_BEARING = {"x": 2.0e8, "y": 1.7e8}
+LOOSE_BEARING = {"x": 4.0e8, "y": 3.5e8}
 """Chosen, known: loose bearing [N/m]."""
-COUPLING = {"x": 4e6, "y": 5e6, "z": 8e6, "rx": 400.0, "ry": 500.0, "rz": 1.6e4}
+COUPLING = {"x": 4e6, "y": 5e6, "z": 8e6, "rx": 400.0, "ry": 500.0, "rz": 1.7e4}
 """Chosen: coupling [N/m, Nm/rad]; its k_rz is unknown."""
 COUPLING_LOSS = 800.0
 """Chosen: hysteretic damping d_rz of the coupling [Nm/rad]."""
-NUT = {"x": 2.5e8, "y": 2.2e8, "z": 2.8e8, "rx": 3e5, "ry": 2.5e5, "rz": 120.0}
+NUT = {"x": 5.0e8, "y": 4.5e8, "z": 2.8e8, "rx": 3e5, "ry": 2.5e5, "rz": 120.0}
 """Chosen: nut on the screw [N/m, Nm/rad]; k_z is unknown; rz replaces friction."""
 NUT_LOSS = 15.0
 """Chosen: hysteretic damping d_rz of the nut [Nm/rad]."""
 LEAD = 0.02
 """Chosen, known: lead of the screw [m per turn]."""
-GUIDE = {"x": 1.6e8, "y": 2.0e8, "z": 2.5e6, "rx": 1.2e6, "ry": 9e5, "rz": 3e5}
+GUIDE = {"x": 1.6e8, "y": 1.5e8, "z": 2.5e6, "rx": 1.2e6, "ry": 9e5, "rz": 3e5}
 """Chosen: guide shoe [N/m, Nm/rad]; k_x, k_y, k_rx, k_ry are unknown, z replaces friction."""
 Z_MOTOR_BEARING = {"x": 4e8, "y": 4e8, "z": 3e8, "rx": 4e6, "ry": 4e6}
 """Chosen, known: bearings of the z-motor [N/m, Nm/rad]."""
 X_MOTOR_BEARING = {"x": 4e8, "y": 5e8, "z": 5e8, "ry": 5e6, "rz": 5e6}
 """Chosen, known: bearings of the x-motor, which spins about x [N/m, Nm/rad]."""
-Z_BRAKE, X_BRAKE = 90.0, 7.2e4
+Z_BRAKE, X_BRAKE = 90.0, 6.4e4
 """Chosen, known: torsional stiffness of the brakes [Nm/rad]: that of the z-axis is open, friction remains; that of the
 x-axis is applied."""
 SHOE_OFFSETS = (-0.16, 0.16)

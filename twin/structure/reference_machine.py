@@ -31,8 +31,8 @@ LOSS_FACTOR = {"bed": 0.004, "table": 0.004, "screw": 0.003, "x_rotor": 0.003, "
 JOINT_LOSS_FACTOR = 0.008
 """Chosen, known: hysteretic damping of all joints but the mounting elements, as a share of their stiffness [-]."""
 MOUNTING = (
-    {"stiffness": (4.0e7, 8.0e7, 3.2e7), "viscous": (1.7e4, 8.0e3), "hysteretic": 8.0e6},
-    {"stiffness": (3.0e7, 7.0e7, 4.2e7), "viscous": (2.6e4, 2.2e4), "hysteretic": 6.5e6},
+    {"stiffness": (4.0e7, 8.0e7, 3.2e7), "viscous": (1.7e4, 7.4e3), "hysteretic": 8.0e6},
+    {"stiffness": (3.0e7, 7.0e7, 4.2e7), "viscous": (2.2e4, 2.2e4), "hysteretic": 6.5e6},
     {"stiffness": (4.0e7, 6.0e7, 2.6e7), "viscous": (2.0e4, 1.4e4), "hysteretic": 5.0e6},
 )
 """Chosen: mounting elements 1 to 3: k_x, k_y, k_z [N/m], b_x, b_z [Ns/m], d_y [N/m]."""
@@ -52,7 +52,7 @@ NUT_LOSS = 15.0
 """Chosen: hysteretic damping d_rz of the nut [Nm/rad]."""
 LEAD = 0.02
 """Chosen, known: lead of the screw [m per turn]."""
-GUIDE = {"x": 1.6e8, "y": 1.5e8, "z": 2.5e6, "rx": 1.2e6, "ry": 9e5, "rz": 3e5}
+GUIDE = {"x": 1.6e8, "y": 1.45e8, "z": 2.5e6, "rx": 1.2e6, "ry": 9e5, "rz": 3e5}
 """Chosen: guide shoe [N/m, Nm/rad]; k_x, k_y, k_rx, k_ry are unknown, z replaces friction."""
 Z_MOTOR_BEARING = {"x": 4e8, "y": 4e8, "z": 3e8, "rx": 4e6, "ry": 4e6}
 """Chosen, known: bearings of the z-motor [N/m, Nm/rad]."""

@@ -42,8 +42,8 @@ def check_machine(components: dict[str, Component], joints: dict[str, Joint], ma
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise InputError(
-            f"The node name {twice[0]!r} occurs twice in the machine. Give each node, and each named point on a rail, a "
-            "name of its own."
+            f"The node name {twice[0]!r} occurs twice in the machine. Give each node, and each named point on a "
+            "rail, a name of its own."
         )
 
 

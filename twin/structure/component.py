@@ -45,15 +45,15 @@ class Component(eqx.Module):
 
     def __init__(
         self,
-        eigenvalues: Float[ArrayLike, "modes"],
-        shapes: Float[ArrayLike, "..."],
-        positions: Float[ArrayLike, "..."],
+        eigenvalues: ArrayLike | list | tuple,
+        shapes: ArrayLike | list | tuple,
+        positions: ArrayLike | list | tuple,
         nodes: tuple[str, ...],
         *,
-        loss_factor: Float[ArrayLike, ""] = 0.0,
-        density: Float[ArrayLike, ""] = 1.0,
-        modulus: Float[ArrayLike, ""] = 1.0,
-        frequency: Float[ArrayLike, "modes"] | None = None,
+        loss_factor: ArrayLike = 0.0,
+        density: ArrayLike = 1.0,
+        modulus: ArrayLike = 1.0,
+        frequency: ArrayLike | list | tuple | None = None,
         rails: Mapping[str, Rail] | None = None,
         directions: tuple[str, ...] = DIRECTIONS,
     ):
@@ -103,6 +103,6 @@ def _shaped(name: str, value: Any, expected: tuple[int, ...], meaning: str) -> N
     shape = getattr(value, "shape", expected)
     if shape != expected:
         raise InputError(
-            f"{name} must have the shape {expected} {meaning}, but has {shape}. Check that frequencies, shapes and node "
-            "names come from the same model."
+            f"{name} must have the shape {expected} {meaning}, but has {shape}. Check that frequencies, shapes and "
+            "node names come from the same model."
         )

@@ -1,14 +1,14 @@
 """The joints of a machine as rows of springs and dampers."""
 
+from collections.abc import Mapping
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, Float
 
-from twin.structure.component import Component
-from twin.structure.directions import DIRECTIONS
 from twin.structure.joint import Joint
-from twin.structure.point_rows import point_rows
+from twin.structure.motions import Motions, Row, place_key
 
 
 class Connections(eqx.Module):
@@ -26,19 +26,12 @@ class Connections(eqx.Module):
     """Joint, number of the pair, direction: "guide 0 x"."""
 
 
-def connect(components: dict[str, Component], joints: dict[str, Joint], position: Float[ArrayLike, ""]) -> Connections:
-    """The joints at an axis position, joint by joint in the order of their names.
+def connect(joints: Mapping[str, Joint], motions: Motions) -> Connections:
+    """The joints' rows, joint by joint in the order of their names.
 
     Args:
-        components: components by name.
         joints: joints by name.
-        position: axis position [m].
-
-    Returns:
-        The rows.
-
-    Raises:
-        InputError: a point off its rail.
+        motions: motions of the machine's places.
     """
     layout = [
         (name, number, direction)
@@ -46,33 +39,30 @@ def connect(components: dict[str, Component], joints: dict[str, Joint], position
         for number in range(len(joints[name].pairs))
         for direction in joints[name].directions
     ]
-    pairs = [(name, number) for name in sorted(joints) for number in range(len(joints[name].pairs))]
-    firsts = [joints[name].pairs[number][0] for name, number in pairs]
-    seconds = [(i, joints[name].pairs[number][1]) for i, (name, number) in enumerate(pairs)]
-    places = firsts + [second for _, second in seconds if second is not None]
-    rows = point_rows(components, places, position)
 
-    grounded = np.asarray([second is None for _, second in seconds])
-    # A pair on the ground takes its first place as second, to be struck out below.
-    partner = np.where(grounded, np.arange(len(pairs)), len(pairs) - 1 + np.cumsum(~grounded))
-    pair = np.asarray([pairs.index((name, number)) for name, number, _ in layout], dtype=int)
-    direction = np.asarray([DIRECTIONS.index(direction) for _, _, direction in layout], dtype=int)
-    second = jnp.where(grounded[pair][:, None], 0.0, rows[partner[pair], direction])
-    deflection = rows[pair, direction] - second
+    def side(which: int, name: str, number: int, direction: str) -> Row:
+        place = joints[name].pairs[number][which]
+        return None if place is None else (place_key(name, number, which, place), direction)
 
-    axial = np.flatnonzero((direction == DIRECTIONS.index("z")) & ~grounded[pair])
-    leads = jnp.stack([joints[name].lead for name, _, _ in layout])[axial]
-    turning = rows[partner[pair[axial]], DIRECTIONS.index("rz")]
-    deflection = deflection.at[axial].add(-leads[:, None] / (2 * jnp.pi) * turning)
+    firsts = [side(0, *row) for row in layout]
+    seconds = [side(1, *row) for row in layout]
+    turning = [None if row is None or row[1] != "z" else (row[0], "rz") for row in seconds]
+    leads = _of_rows([joints[name].lead for name, _, _ in layout]) / (2 * jnp.pi)
+    vectors = motions.rows(firsts) - motions.rows(seconds) - leads[:, None] * motions.rows(turning)
     return Connections(
-        deflection.T,
-        *(_values(joints, law, layout) for law in ("stiffness", "viscous", "hysteretic")),
+        vectors.T,
+        *(
+            _of_rows([getattr(getattr(joints[name], law), direction) for name, _, direction in layout])
+            for law in ("stiffness", "viscous", "hysteretic")
+        ),
         tuple(f"{name} {number} {direction}" for name, number, direction in layout),
     )
 
 
-def _values(joints: dict[str, Joint], law: str, layout: list[tuple[str, int, str]]) -> Float[Array, "rows"]:
-    laws = {name: getattr(joint, law) for name, joint in joints.items()}
-    own = list(dict.fromkeys((name, direction) for name, _, direction in layout))
-    values = jnp.stack([getattr(laws[name], direction) for name, direction in own])
-    return values[np.asarray([own.index((name, direction)) for name, _, direction in layout], dtype=int)]
+def _of_rows(values: list[Array]) -> Float[Array, "rows"]:
+    """One number for each row; those that several rows share are stacked once."""
+    if not values:
+        return jnp.zeros(0)
+    own = {id(value): value for value in values}
+    order = {key: i for i, key in enumerate(own)}
+    return jnp.stack(list(own.values()))[np.asarray([order[id(value)] for value in values])]

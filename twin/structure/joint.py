@@ -1,4 +1,4 @@
-"""Joints: springs, viscous and hysteretic dampers between two places of a machine, or between a place and the ground."""
+"""Joints: springs, viscous and hysteretic dampers between places of a machine, or between a place and the ground."""
 
 from collections.abc import Sequence
 from typing import Any

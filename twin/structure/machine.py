@@ -4,18 +4,17 @@ from collections.abc import Mapping
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from twin._checks import InputError, finite
+from twin._checks import InputError, as_scalar, finite, is_concrete
 from twin.linear import SecondOrder
 from twin.structure._check_machine import check_machine
 from twin.structure.component import Component
 from twin.structure.connections import Connections, connect
 from twin.structure.directions import DIRECTIONS
-from twin.structure.joint import Attachment, Joint
+from twin.structure.joint import Joint
 from twin.structure.lumped_mass import LumpedMass
-from twin.structure.point_rows import point_rows
+from twin.structure.motions import Motions, Row
 
 
 class Machine(eqx.Module):
@@ -56,7 +55,7 @@ class Machine(eqx.Module):
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names "node direction" of what can be measured or excited: at the nodes, then at named points on rails."""
-        return tuple(f"{name} {direction}" for name in self._measured() for direction in DIRECTIONS)
+        return tuple(f"{name} {direction}" for name in self._nodes() for direction in DIRECTIONS)
 
     def second_order(
         self,
@@ -81,28 +80,11 @@ class Machine(eqx.Module):
         Raises:
             InputError: 64-bit mode off, a position off a rail or not finite, an unknown input or output.
         """
-        finite("position", position, "m")
-        parts = [self.components[name] for name in sorted(self.components)]
-        own = jnp.concatenate([part.own_eigenvalues for part in parts])
-        lost = jnp.concatenate([part.loss_factor * part.own_eigenvalues for part in parts])
-        joined = self.connections(position)
-
-        def coupled(diagonal: Array, values: Array) -> Array:
-            return jnp.diag(diagonal) + (joined.vectors * values) @ joined.vectors.T
-
-        measured = self._measured()
-        chosen = [self._rows(names) for names in (inputs, outputs)]
-        motions = point_rows(self.components, list(measured.values()), position).reshape(-1, own.size)
-        return SecondOrder(
-            mass=self._mass(own.size),
-            viscous=coupled(jnp.zeros_like(own), joined.viscous),
-            hysteretic=coupled(lost, joined.hysteretic),
-            stiffness=coupled(own, joined.stiffness),
-            input_map=motions[chosen[0]].T,
-            output_map=motions[chosen[1]],
-            inputs=self.outputs if inputs is None else tuple(inputs),
-            outputs=self.outputs if outputs is None else tuple(outputs),
-        )
+        self._check_position(position)
+        excited = self.outputs if inputs is None else tuple(inputs)
+        measured = self.outputs if outputs is None else tuple(outputs)
+        matrices = _matrices(self, as_scalar(position), self._places(excited), self._places(measured))
+        return SecondOrder(*matrices, inputs=excited, outputs=measured)
 
     def connections(self, position: Float[ArrayLike, ""] = 0.0) -> Connections:
         """The joints' springs and dampers at an axis position, in the coordinates of `second_order`.
@@ -113,36 +95,64 @@ class Machine(eqx.Module):
         Raises:
             InputError: a position off a rail.
         """
-        return connect(self.components, self.joints, position)
+        self._check_position(position)
+        return _connections(self, as_scalar(position))
 
-    def _mass(self, size: int) -> Float[Array, "dofs dofs"]:
-        lumps = [self.masses[name] for name in sorted(self.masses)]
-        if not lumps:
-            return jnp.eye(size)
-        places = [Attachment(lump.component, lump.node) for lump in lumps]
-        motions = point_rows(self.components, places, 0.0).reshape(-1, size)
-        values = [v for m in lumps for v in (m.mass, m.mass, m.mass, m.inertia_x, m.inertia_y, m.inertia_z)]
-        return jnp.eye(size) + (motions.T * jnp.stack(values)) @ motions
-
-    def _measured(self) -> dict[str, Attachment]:
-        """Places whose motion can be asked for, by name."""
-        found = {
-            node: Attachment(name, node) for name in sorted(self.components) for node in self.components[name].nodes
-        }
-        for joint in (self.joints[name] for name in sorted(self.joints)):
+    def _check_position(self, position: ArrayLike) -> None:
+        finite("position", position, "m")
+        for joint in self.joints.values():
             for place in (place for pair in joint.pairs for place in pair):
-                if place is not None and place.name is not None:
-                    found[place.name] = place
-        return found
+                if place is not None and place.rail is not None and is_concrete(position):
+                    rail = self.components[place.component].rails[place.rail]
+                    rail.check(place.offset + position, f"rail {place.rail!r} of component {place.component!r}")
 
-    def _rows(self, names: tuple[str, ...] | None) -> np.ndarray | slice:
-        if names is None:
-            return slice(None)
-        known = {name: i for i, name in enumerate(self.outputs)}
+    def _nodes(self) -> tuple[str, ...]:
+        """Names of the nodes, then of the named points on rails."""
+        nodes = [node for name in sorted(self.components) for node in self.components[name].nodes]
+        pairs = [pair for name in sorted(self.joints) for pair in self.joints[name].pairs]
+        return (*nodes, *(place.name for pair in pairs for place in pair if place is not None and place.name))
+
+    def _places(self, names: tuple[str, ...]) -> tuple[Row, ...]:
+        nodes, places = self._nodes(), []
         for name in names:
-            if name not in known:
+            node, _, direction = name.rpartition(" ")
+            if node not in nodes or direction not in DIRECTIONS:
                 raise InputError(
-                    f"The machine has no node and direction {name!r}. Nodes: {', '.join(self._measured())}; directions: "
-                    f'{", ".join(DIRECTIONS)}; written as "{next(iter(known))}".'
+                    f"The machine has no node and direction {name!r}. Nodes: {', '.join(nodes)}; directions: "
+                    f"{', '.join(DIRECTIONS)}; written as '{(*nodes, 'N1')[0]} x'."
                 )
-        return np.asarray([known[name] for name in names], dtype=int)
+            places.append((node, direction))
+        return tuple(places)
+
+
+# Compiled as one piece: operation by operation, outside of compiled code, a machine takes a hundred times longer.
+@eqx.filter_jit
+def _connections(machine: Machine, position: Float[Array, ""]) -> Connections:
+    return connect(machine.joints, Motions(machine.components, machine.joints, position))
+
+
+@eqx.filter_jit
+def _matrices(
+    machine: Machine, position: Float[Array, ""], excited: tuple[Row, ...], measured: tuple[Row, ...]
+) -> tuple[Array, ...]:
+    """M, C, D, K, input and output map."""
+    motions = Motions(machine.components, machine.joints, position)
+    joined = connect(machine.joints, motions)
+    parts = [machine.components[name] for name in sorted(machine.components)]
+    own = jnp.concatenate([part.own_eigenvalues for part in parts])
+    lost = jnp.concatenate([part.loss_factor * part.own_eigenvalues for part in parts])
+
+    def coupled(diagonal: Array, vectors: Array, values: Array) -> Array:
+        return jnp.diag(diagonal) + (vectors * values) @ vectors.T
+
+    lumps = [machine.masses[name] for name in sorted(machine.masses)]
+    moved = motions.rows([(lump.node, direction) for lump in lumps for direction in DIRECTIONS]).T
+    weights = [v for m in lumps for v in (m.mass, m.mass, m.mass, m.inertia_x, m.inertia_y, m.inertia_z)]
+    return (
+        coupled(jnp.ones_like(own), moved, jnp.stack(weights) if weights else jnp.zeros(0)),
+        coupled(jnp.zeros_like(own), joined.vectors, joined.viscous),
+        coupled(lost, joined.vectors, joined.hysteretic),
+        coupled(own, joined.vectors, joined.stiffness),
+        motions.rows(excited).T,
+        motions.rows(measured),
+    )

@@ -1,0 +1,104 @@
+"""Measured frequency responses from universal files (dataset 58)."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from twin._checks import InputError
+from twin.frf import FRF
+from twin.io._uff import read_sets, unit_factors
+from twin.structure import DIRECTIONS
+
+_FREQUENCY_RESPONSE = 4
+_FORMS = {8: "receptance", 11: "mobility", 12: "accelerance"}
+_FORCES = (9, 13)
+
+
+def read_frf_uff(
+    path: str | os.PathLike[str],
+    *,
+    names: Mapping[int, str] | None = None,
+    outputs: tuple[str, ...] | None = None,
+    inputs: tuple[str, ...] | None = None,
+) -> FRF:
+    """Read the frequency response functions of a universal file.
+
+    Responses and excitations are named "node direction" as those of a machine, "12 x" or "12 ry"; a response measured
+    against a direction is turned round. Values are converted to SI by dataset 164 where the file has one.
+
+    Args:
+        path: the file.
+        names: names of nodes by their number in the file; a node without keeps its number.
+        outputs: responses wanted; None for all.
+        inputs: excitations wanted; None for all.
+
+    Returns:
+        The response: receptance [m/N], mobility [m/(Ns)] or accelerance [m/(Ns²)], or its like in rotations.
+
+    Raises:
+        InputError: a file that cannot be read, no response function in it, one given twice or missing, functions of
+            different form or frequencies, a quantity other than motion over force.
+    """
+    sets, file = read_sets(path)
+    length, force = unit_factors(sets)
+    functions = [one for one in sets if one["type"] == 58 and int(one["func_type"]) == _FREQUENCY_RESPONSE]
+    found: dict[tuple[str, str], tuple[np.ndarray, np.ndarray]] = {}
+    forms: dict[str, tuple[str, str]] = {}
+    for one in functions:
+        response, up, turning = _place(one, "rsp", names or {}, file)
+        excitation, along, moment = _place(one, "ref", names or {}, file)
+        wanted = (outputs is None or response in outputs) and (inputs is None or excitation in inputs)
+        if not wanted:
+            continue
+        if (response, excitation) in found:
+            raise InputError(
+                f"Universal file {str(file)!r} has the response of {response!r} to {excitation!r} twice. Remove one."
+            )
+        forms.setdefault(_form(one, file), (response, excitation))
+        scale = up * along * force * (length if moment else 1.0) / (1.0 if turning else length)
+        found[response, excitation] = (np.asarray(one["x"], dtype=np.float64), np.asarray(one["data"]) * scale)
+    rows = tuple(dict.fromkeys(response for response, _ in found)) if outputs is None else outputs
+    columns = tuple(dict.fromkeys(excitation for _, excitation in found)) if inputs is None else inputs
+    for pair in ((row, column) for row in rows for column in columns):
+        if pair not in found:
+            raise InputError(
+                f"Universal file {str(file)!r} has no response of {pair[0]!r} to {pair[1]!r}. Choose outputs and "
+                "inputs that were all measured."
+            )
+    if not found:
+        raise InputError(f"Universal file {str(file)!r} holds no frequency response function (dataset 58, function 4).")
+    if len(forms) > 1:
+        listed = " and ".join(f"{form} ({pair[0]} / {pair[1]})" for form, pair in forms.items())
+        raise InputError(f"Universal file {str(file)!r} mixes {listed}. Choose outputs and inputs of one form.")
+    frequency = next(iter(found.values()))[0]
+    for pair, (own, _) in found.items():
+        if own.shape != frequency.shape or not np.allclose(own, frequency, rtol=1e-6):
+            raise InputError(f"The response of {pair[0]!r} to {pair[1]!r} has other frequencies. Resample it first.")
+    values = np.stack([np.stack([found[row, column][1] for column in columns]) for row in rows])
+    return FRF(jnp.asarray(frequency), jnp.asarray(values, dtype=complex), rows, columns, form=next(iter(forms)))
+
+
+def _place(one: dict[str, Any], end: str, names: Mapping[int, str], file: Path) -> tuple[str, float, bool]:
+    """Name "node direction", sign, and whether it is a rotation or moment."""
+    node, direction = int(one[f"{end}_node"]), int(one[f"{end}_dir"])
+    if not 1 <= abs(direction) <= 6:
+        raise InputError(
+            f"Universal file {str(file)!r} has the direction {direction} at node {node}, but 1 to 6 with a sign are "
+            "expected. Name the directions of scalar channels before the export."
+        )
+    name = f"{names.get(node, str(node))} {DIRECTIONS[abs(direction) - 1]}"
+    return name, float(np.sign(direction)), abs(direction) > 3
+
+
+def _form(one: dict[str, Any], file: Path) -> str:
+    motion, force = int(one["ordinate_spec_data_type"]), int(one["orddenom_spec_data_type"])
+    if motion not in _FORMS or force not in _FORCES:
+        raise InputError(
+            f"Universal file {str(file)!r} has a response of data type {motion} over {force}, but displacement (8), "
+            "velocity (11) or acceleration (12) over force (13) is expected. Export motion over force."
+        )
+    return _FORMS[motion]

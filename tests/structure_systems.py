@@ -70,7 +70,7 @@ def beam_matrices(elements, length, *, stiffness=STIFFNESS, line_mass=LINE_MASS)
     return mass, stiff
 
 
-def beam(names, elements, length, *, start=0.0, below=1e9, **more):
+def beam(names, elements, length, *, start=0.0, below=1e9, interfaces=None, **more):
     """A free beam with nodes at its two ends and a rail along all of it."""
     x = np.linspace(0, length, elements + 1)
     rows = np.arange(2 * (elements + 1)).reshape(-1, 2)
@@ -81,6 +81,7 @@ def beam(names, elements, length, *, start=0.0, below=1e9, **more):
         ends,
         rows[[0, -1]],
         below=below,
+        interfaces=None if interfaces is None else rows[interfaces],
         directions=("y", "rz"),
         rails={"line": (x, rows)},
         **more,

@@ -88,15 +88,13 @@ def read_component_uff(
 def _shape(one: dict[str, Any], chosen: Mapping[int, str], file: Path) -> np.ndarray:
     """One mode's shape at the nodes chosen, (nodes, 3 or 6)."""
     mode = f"mode {one.get('mode_n', '?')} of {str(file)!r}"
-    values = np.stack([one[f"r{i}"] for i in range(1, 7) if f"r{i}" in one], axis=1)
+    values = np.stack([np.asarray(one[f"r{i}"], dtype=complex) for i in range(1, 7) if f"r{i}" in one], axis=1)
     if values.shape[1] not in (3, 6):
         raise InputError(f"The shape of {mode} has {values.shape[1]} values a node, but three or six are expected.")
-    if np.iscomplexobj(values):
-        if np.max(np.abs(values.imag)) > _IMAGINARY * np.max(np.abs(values)):
-            raise InputError(f"The shape of {mode} is complex. A component takes the real modes of the undamped body.")
-        values = values.real
+    if np.max(np.abs(np.imag(values))) > _IMAGINARY * np.max(np.abs(values)):
+        raise InputError(f"The shape of {mode} is complex. A component takes the real modes of the undamped body.")
     rows = {int(number): i for i, number in enumerate(one["node_nums"])}
     for number in chosen:
         if number not in rows:
             raise InputError(f"The shape of {mode} has no node {number}. Leave the node out, or export all its modes.")
-    return values[[rows[number] for number in chosen]].astype(np.float64)
+    return np.real(values[[rows[number] for number in chosen]])

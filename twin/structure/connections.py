@@ -44,6 +44,9 @@ def connect(joints: Mapping[str, Joint], motions: Motions) -> Connections:
         place = joints[name].pairs[number][which]
         return None if place is None else (place_key(name, number, which, place), direction)
 
+    def values(law: str) -> Array:
+        return _of_rows([getattr(getattr(joints[name], law), direction) for name, _, direction in layout])
+
     firsts = [side(0, *row) for row in layout]
     seconds = [side(1, *row) for row in layout]
     turning = [None if row is None or row[1] != "z" else (row[0], "rz") for row in seconds]
@@ -51,10 +54,9 @@ def connect(joints: Mapping[str, Joint], motions: Motions) -> Connections:
     vectors = motions.rows(firsts) - motions.rows(seconds) - leads[:, None] * motions.rows(turning)
     return Connections(
         vectors.T,
-        *(
-            _of_rows([getattr(getattr(joints[name], law), direction) for name, _, direction in layout])
-            for law in ("stiffness", "viscous", "hysteretic")
-        ),
+        values("stiffness"),
+        values("viscous"),
+        values("hysteretic"),
         tuple(f"{name} {number} {direction}" for name, number, direction in layout),
     )
 

@@ -11,6 +11,9 @@ from twin.structure.component import Component
 from twin.structure.directions import DIRECTIONS
 from twin.structure.rail import Rail
 
+# Static deflections that are combinations of others but for this share bring nothing new.
+_DEPENDENT = 1e-8
+
 
 def component_from_modes(
     frequency: ArrayLike | list | tuple,
@@ -98,12 +101,17 @@ def component_modes(
     dofs: Any,
     *,
     below: float,
+    interfaces: Any = None,
     rigid_below: float = 1.0,
     directions: Sequence[str] = DIRECTIONS,
     loss_factor: float = 0.0,
     rails: Mapping[str, tuple[Any, Any]] | None = None,
 ) -> Component:
     """A component from the matrices of a free body: all rigid-body modes, and the elastic ones below a frequency.
+
+    The modes left out make the body too stiff where joints act, which matters where joints are stiff. With `interfaces`
+    their static share is kept: to the modes come the body's static deflections under a unit load at each of these rows,
+    as far as the modes lack them, made into further shapes with eigenvalues of their own.
 
     Args:
         mass: M, symmetric and positive definite (n, n) [kg].
@@ -113,6 +121,8 @@ def component_modes(
         dofs: which row of the matrices each node and direction is (nodes, directions), integers.
         below: modes below this frequency are kept [Hz]. Two to three times the highest frequency of interest is
             customary for a free-interface model.
+        interfaces: rows of the matrices at which the flexibility shall be exact at rest, integers of any shape; None
+            for the modes alone.
         rigid_below: a mode below this frequency is a rigid-body mode, to which rounding gave a frequency [Hz].
         directions: directions that the second axis of `dofs` holds.
         loss_factor: material damping η [-].
@@ -126,7 +136,8 @@ def component_modes(
             body that is not free of negative stiffness, no mode below the frequency.
 
     Source: R. R. Craig, A. J. Kurdila, "Fundamentals of Structural Dynamics", 2nd ed. 2006, ch. 17 (free-interface
-    modes).
+    modes); R. H. MacNeal, "A hybrid method of component mode synthesis", Computers & Structures 1 (1971) 581-601
+    (residual flexibility).
     """
     import scipy.linalg
 
@@ -152,18 +163,23 @@ def component_modes(
             else f"The body has no mode below {below:g} Hz. Raise the frequency; a free body has rigid-body modes."
         )
 
+    values = np.where(rigid, 0.0, values)
+    if interfaces is not None:
+        loaded = _rows("interfaces", np.asarray(interfaces).ravel(), m.shape[0])
+        extra_values, extra = _residual_modes(m, k, vectors, vectors[:, rigid], loaded)
+        values, vectors = np.concatenate([values, extra_values]), np.concatenate([vectors, extra], axis=1)
+
     def at(name: str, rows: Any) -> np.ndarray:
-        index = np.asarray(rows)
-        sound = index.dtype.kind in "iu" and index.ndim == 2 and index.shape[1] == len(directions)
-        if not sound or (index.size and not (index.min() >= 0 and index.max() < m.shape[0])):
+        index = _rows(name, rows, m.shape[0])
+        if index.ndim != 2 or index.shape[1] != len(directions):
             raise InputError(
-                f"{name} must hold rows of the matrices, integers from 0 to {m.shape[0] - 1}, in the shape (places, "
-                f"{len(directions)} directions), but is {index.dtype} {index.shape}. Check the numbering."
+                f"{name} must have the shape (places, {len(directions)} directions), but has {index.shape}. Give each "
+                "place a row for each direction."
             )
         return vectors[index]
 
     return component_from_modes(
-        np.sqrt(np.where(rigid, 0.0, values)) / (2 * np.pi),
+        np.sqrt(values) / (2 * np.pi),
         at("dofs", dofs),
         nodes,
         positions,
@@ -181,6 +197,38 @@ def _matrix(name: str, value: Any) -> np.ndarray:
     if np.max(np.abs(array - array.T)) > 1e-9 * np.max(np.abs(array)):
         raise InputError(f"{name} must be symmetric, but is not. Use the matrix of the whole body, both halves filled.")
     return (array + array.T) / 2
+
+
+def _rows(name: str, rows: Any, size: int) -> np.ndarray:
+    index = np.asarray(rows)
+    if index.dtype.kind not in "iu" or (index.size and not (index.min() >= 0 and index.max() < size)):
+        raise InputError(
+            f"{name} must hold rows of the matrices, integers from 0 to {size - 1}, but holds {index.dtype} from "
+            f"{np.min(index, initial=0):g} to {np.max(index, initial=0):g}. Check the numbering."
+        )
+    return index
+
+
+def _residual_modes(
+    mass: np.ndarray, stiffness: np.ndarray, kept: np.ndarray, rigid: np.ndarray, loaded: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues and mass-normalised shapes in the space of the static deflections that the kept modes lack."""
+    import scipy.linalg
+
+    loads = -(mass @ kept) @ kept[loaded].T
+    loads[loaded, np.arange(loaded.size)] += 1.0
+    # These loads move no rigid-body mode; holding those makes K regular and changes nothing else.
+    held = mass @ rigid
+    scale = np.trace(stiffness) / max(np.sum(held**2), 1e-300)
+    deflections = scipy.linalg.solve(stiffness + scale * held @ held.T, loads, assume_a="pos")
+    deflections -= kept @ (kept.T @ (mass @ deflections))
+    small = deflections.T @ mass @ deflections
+    size = np.sqrt(np.diag(small))
+    share, basis = np.linalg.eigh(small / np.outer(size, size))
+    own = share > _DEPENDENT
+    deflections = deflections / size @ basis[:, own] / np.sqrt(share[own])
+    values, turn = scipy.linalg.eigh(deflections.T @ stiffness @ deflections)
+    return values, deflections @ turn
 
 
 def _number(direction: str) -> int:

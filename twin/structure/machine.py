@@ -55,7 +55,7 @@ class Machine(eqx.Module):
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names "node direction" of what can be measured or excited: at the nodes, then at named points on rails."""
-        return tuple(f"{name} {direction}" for name in self._nodes() for direction in DIRECTIONS)
+        return tuple(f"{name} {direction}" for name in _nodes(self) for direction in DIRECTIONS)
 
     def second_order(
         self,
@@ -80,10 +80,11 @@ class Machine(eqx.Module):
         Raises:
             InputError: 64-bit mode off, a position off a rail or not finite, an unknown input or output.
         """
-        self._check_position(position)
-        excited = self.outputs if inputs is None else tuple(inputs)
-        measured = self.outputs if outputs is None else tuple(outputs)
-        matrices = _matrices(self, as_scalar(position), self._places(excited), self._places(measured))
+        _check_position(self, position)
+        nodes, everything = _nodes(self), self.outputs
+        excited = everything if inputs is None else tuple(inputs)
+        measured = everything if outputs is None else tuple(outputs)
+        matrices = _matrices(self, as_scalar(position), _places(nodes, excited), _places(nodes, measured))
         return SecondOrder(*matrices, inputs=excited, outputs=measured)
 
     def connections(self, position: Float[ArrayLike, ""] = 0.0) -> Connections:
@@ -95,34 +96,8 @@ class Machine(eqx.Module):
         Raises:
             InputError: a position off a rail.
         """
-        self._check_position(position)
+        _check_position(self, position)
         return _connections(self, as_scalar(position))
-
-    def _check_position(self, position: ArrayLike) -> None:
-        finite("position", position, "m")
-        for joint in self.joints.values():
-            for place in (place for pair in joint.pairs for place in pair):
-                if place is not None and place.rail is not None and is_concrete(position):
-                    rail = self.components[place.component].rails[place.rail]
-                    rail.check(place.offset + position, f"rail {place.rail!r} of component {place.component!r}")
-
-    def _nodes(self) -> tuple[str, ...]:
-        """Names of the nodes, then of the named points on rails."""
-        nodes = [node for name in sorted(self.components) for node in self.components[name].nodes]
-        pairs = [pair for name in sorted(self.joints) for pair in self.joints[name].pairs]
-        return (*nodes, *(place.name for pair in pairs for place in pair if place is not None and place.name))
-
-    def _places(self, names: tuple[str, ...]) -> tuple[Row, ...]:
-        nodes, places = self._nodes(), []
-        for name in names:
-            node, _, direction = name.rpartition(" ")
-            if node not in nodes or direction not in DIRECTIONS:
-                raise InputError(
-                    f"The machine has no node and direction {name!r}. Nodes: {', '.join(nodes)}; directions: "
-                    f"{', '.join(DIRECTIONS)}; written as '{(*nodes, 'N1')[0]} x'."
-                )
-            places.append((node, direction))
-        return tuple(places)
 
 
 # Compiled as one piece: operation by operation, outside of compiled code, a machine takes a hundred times longer.
@@ -156,3 +131,32 @@ def _matrices(
         motions.rows(excited).T,
         motions.rows(measured),
     )
+
+
+def _check_position(machine: Machine, position: ArrayLike) -> None:
+    finite("position", position, "m")
+    for joint in machine.joints.values():
+        for place in (place for pair in joint.pairs for place in pair):
+            if place is not None and place.rail is not None and is_concrete(position):
+                rail = machine.components[place.component].rails[place.rail]
+                rail.check(place.offset + position, f"rail {place.rail!r} of component {place.component!r}")
+
+
+def _nodes(machine: Machine) -> tuple[str, ...]:
+    """Names of the nodes, then of the named points on rails."""
+    nodes = [node for name in sorted(machine.components) for node in machine.components[name].nodes]
+    pairs = [pair for name in sorted(machine.joints) for pair in machine.joints[name].pairs]
+    return (*nodes, *(place.name for pair in pairs for place in pair if place is not None and place.name))
+
+
+def _places(nodes: tuple[str, ...], names: tuple[str, ...]) -> tuple[Row, ...]:
+    places = []
+    for name in names:
+        node, _, direction = name.rpartition(" ")
+        if node not in nodes or direction not in DIRECTIONS:
+            raise InputError(
+                f"The machine has no node and direction {name!r}. Nodes: {', '.join(nodes)}; directions: "
+                f"{', '.join(DIRECTIONS)}; written as '{(*nodes, 'N1')[0]} x'."
+            )
+        places.append((node, direction))
+    return tuple(places)

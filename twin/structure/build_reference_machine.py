@@ -14,8 +14,8 @@ from jaxtyping import Bool, Float
 from twin.structure.shaft_modes import shaft_modes
 from twin.structure.solid_modes import SolidModes, rigid_motions, solid_modes
 
-CAST_IRON = {"modulus": 1.0e11, "ratio": 0.26, "density": 7200.0}
-"""Chosen: Young's modulus [N/m²], Poisson's ratio and density [kg/m³] of bed and table."""
+CAST_IRON = {"modulus": 9.0e10, "ratio": 0.26, "density": 7200.0}
+"""Chosen: Young's modulus [N/m²], Poisson's ratio and density [kg/m³] of bed and table, of grey iron."""
 STEEL = {"modulus": 2.1e11, "ratio": 0.3, "density": 7850.0}
 """Chosen: the same of the screw."""
 SCREW_X, SCREW_Y = 0.035, 0.48
@@ -26,11 +26,13 @@ RAIL = np.linspace(-0.55, 0.60, 24)
 """Chosen: points of the guide rails along z at which shapes are stored [m]."""
 SHOE_Z = 0.16
 """Chosen: distance of the guide shoes from the table's middle along the axis [m]."""
+BED_FRONT = (-1.20, -1.166, -1.02, -0.86, -0.66, -0.62, -0.48, -0.34, -0.20, -0.16)
+BED_BACK = (0.0, 0.14, 0.28, 0.32, 0.45, 0.58, 0.62, 0.76, 0.90, 1.06, 1.10)
+"""Chosen: planes between the boxes of the bed in z [m]: front, where the z-motor is, and back."""
 BED = (
     (-0.42, -0.39, -0.34, -0.26, -0.12, 0.0, 0.12, 0.26, 0.34, 0.375, 0.42),
     (0.0, 0.05, 0.15, 0.315, 0.36, 0.42, 0.60, 0.82),
-    (-1.20, -1.166, -1.02, -0.86, -0.66, -0.62, -0.48, -0.34, -0.20, -0.16, 0.0, 0.14, 0.28, 0.32, 0.45, 0.58, 0.62)
-    + (0.76, 0.90, 1.06, 1.10),
+    (*BED_FRONT, *BED_BACK),
 )
 """Chosen: planes between the boxes of the bed in x, y, z [m]."""
 TABLE = (
@@ -56,8 +58,8 @@ ROTORS = {
         {"N10b": (SCREW_X, SCREW_Y, -0.71), "N21a": (SCREW_X, SCREW_Y, -0.50)},
     ),
 }
-"""Chosen: mass [kg], inertias about x, y, z [kg m²], centre and nodes [m] of the motors' rotors; the x-motor spins about
-x."""
+"""Chosen: mass [kg], inertias about x, y, z [kg m²], centre and nodes [m] of the motors' rotors. The x-motor spins
+about x."""
 BED_NODES = {
     "N8a": ((-0.46, 0.38, 0.06), (-0.419, 0.31, 0.06), (0.0, 0.04, 0.06)),
     "N9a": ((0.46, 0.22, 0.80), (0.419, 0.22, 0.80), (0.0, 0.12, 0.12)),
@@ -91,7 +93,7 @@ SCREW_ELASTIC = {"bending": 3, "axial": 2, "torsion": 2}
 """Elastic modes kept of the screw, bending in each plane."""
 
 
-def reference_arrays() -> dict[str, Float[np.ndarray, "..."]]:
+def reference_arrays() -> dict[str, Any]:
     """All arrays of the reference machine, named "component.what"; nodes in the order of their names here."""
     arrays: dict[str, Any] = {}
     for name, planes, kept, nodes in (("bed", BED, _bed, BED_NODES), ("table", TABLE, _table, TABLE_NODES)):

@@ -33,7 +33,7 @@ JOINT_LOSS_FACTOR = 0.008
 """Chosen, known: hysteretic damping of all joints but the mounting elements, as a share of their stiffness [-]."""
 MOUNTING = (
     {"stiffness": (4.0e7, 8.0e7, 3.2e7), "viscous": (1.55e4, 7.0e3), "hysteretic": 8.0e6},
-    {"stiffness": (3.0e7, 7.0e7, 4.2e7), "viscous": (2.2e4, 2.2e4), "hysteretic": 6.5e6},
+    {"stiffness": (3.0e7, 7.0e7, 4.2e7), "viscous": (2.0e4, 2.2e4), "hysteretic": 6.5e6},
     {"stiffness": (4.0e7, 6.0e7, 2.6e7), "viscous": (2.0e4, 1.4e4), "hysteretic": 5.0e6},
 )
 """Chosen: mounting elements 1 to 3: k_x, k_y, k_z [N/m], b_x, b_z [Ns/m], d_y [N/m]."""
@@ -43,9 +43,9 @@ FIXED_BEARING = {"x": 5.0e8, "y": 4.5e8, "z": 2.2e8, "rx": 4e5, "ry": 3.4e5}
 """Chosen: fixed bearing [N/m, Nm/rad]; its k_z is unknown."""
 LOOSE_BEARING = {"x": 4.0e8, "y": 3.5e8}
 """Chosen, known: loose bearing [N/m]."""
-COUPLING = {"x": 4e6, "y": 5e6, "z": 8e6, "rx": 400.0, "ry": 500.0, "rz": 1.58e4}
+COUPLING = {"x": 4e6, "y": 5e6, "z": 8e6, "rx": 400.0, "ry": 500.0, "rz": 2.8e4}
 """Chosen: coupling [N/m, Nm/rad]; its k_rz is unknown."""
-COUPLING_LOSS = 800.0
+COUPLING_LOSS = 1300.0
 """Chosen: hysteretic damping d_rz of the coupling [Nm/rad]."""
 NUT = {"x": 5.0e8, "y": 4.5e8, "z": 2.8e8, "rx": 3e5, "ry": 2.5e5, "rz": 120.0}
 """Chosen: nut on the screw [N/m, Nm/rad]; k_z is unknown; rz replaces friction."""

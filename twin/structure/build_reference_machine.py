@@ -14,8 +14,8 @@ from jaxtyping import Bool, Float
 from twin.structure.shaft_modes import shaft_modes
 from twin.structure.solid_modes import SolidModes, rigid_motions, solid_modes
 
-CAST_IRON = {"modulus": 1.05e11, "ratio": 0.26, "density": 7200.0}
-"""Chosen: Young's modulus [N/m²], Poisson's ratio and density [kg/m³] of bed and table."""
+CAST_IRON = {"modulus": 9.0e10, "ratio": 0.26, "density": 7200.0}
+"""Chosen: Young's modulus [N/m²], Poisson's ratio and density [kg/m³] of bed and table, of grey iron."""
 STEEL = {"modulus": 2.1e11, "ratio": 0.3, "density": 7850.0}
 """Chosen: the same of the screw."""
 SCREW_X, SCREW_Y = 0.035, 0.48
@@ -26,11 +26,13 @@ RAIL = np.linspace(-0.55, 0.60, 24)
 """Chosen: points of the guide rails along z at which shapes are stored [m]."""
 SHOE_Z = 0.16
 """Chosen: distance of the guide shoes from the table's middle along the axis [m]."""
+BED_FRONT = (-1.20, -1.166, -1.02, -0.86, -0.66, -0.62, -0.48, -0.34, -0.20, -0.16)
+BED_BACK = (0.0, 0.14, 0.28, 0.32, 0.45, 0.58, 0.62, 0.76, 0.90, 1.06, 1.10)
+"""Chosen: planes between the boxes of the bed in z [m]: front, where the z-motor is, and back."""
 BED = (
     (-0.42, -0.39, -0.34, -0.26, -0.12, 0.0, 0.12, 0.26, 0.34, 0.375, 0.42),
     (0.0, 0.05, 0.15, 0.315, 0.36, 0.42, 0.60, 0.82),
-    (-1.20, -1.16, -1.02, -0.86, -0.66, -0.62, -0.48, -0.34, -0.20, -0.16, 0.0, 0.14, 0.28, 0.32, 0.45, 0.58, 0.62)
-    + (0.76, 0.90, 1.06, 1.10),
+    (*BED_FRONT, *BED_BACK),
 )
 """Chosen: planes between the boxes of the bed in x, y, z [m]."""
 TABLE = (
@@ -39,11 +41,11 @@ TABLE = (
     (-0.30, -0.22, -0.10, 0.0, 0.10, 0.22, 0.28),
 )
 """Chosen: planes between the boxes of the table in x, y, z [m]."""
-SCREW = np.linspace(-0.54, 0.48, 52)
+SCREW = np.linspace(-0.50, 0.44, 48)
 """Chosen: points along the screw [m]; its first end is at the coupling."""
-SCREW_BEARINGS = (-0.44, 0.44)
+SCREW_BEARINGS = (-0.40, 0.40)
 """Chosen: where the fixed and the loose bearing are along z [m]."""
-SCREW_RAIL = slice(7, 48)
+SCREW_RAIL = slice(7, 44)
 """Chosen: points of the screw that are its rail for the nut."""
 THREAD, JOURNAL, BORE = 0.080, 0.055, 0.030
 """Chosen: diameter of the screw at its thread, of its journals and of its bore [m]."""
@@ -52,16 +54,16 @@ ROTORS = {
     "z_rotor": (
         16.0,
         (0.06, 0.06, 0.012),
-        (SCREW_X, SCREW_Y, -0.68),
-        {"N10b": (SCREW_X, SCREW_Y, -0.75), "N21a": (SCREW_X, SCREW_Y, -0.54)},
+        (SCREW_X, SCREW_Y, -0.64),
+        {"N10b": (SCREW_X, SCREW_Y, -0.71), "N21a": (SCREW_X, SCREW_Y, -0.50)},
     ),
 }
-"""Chosen: mass [kg], inertias about x, y, z [kg m²], centre and nodes [m] of the motors' rotors; the x-motor spins about
-x."""
+"""Chosen: mass [kg], inertias about x, y, z [kg m²], centre and nodes [m] of the motors' rotors. The x-motor spins
+about x."""
 BED_NODES = {
     "N8a": ((-0.46, 0.38, 0.06), (-0.419, 0.31, 0.06), (0.0, 0.04, 0.06)),
     "N9a": ((0.46, 0.22, 0.80), (0.419, 0.22, 0.80), (0.0, 0.12, 0.12)),
-    "N10a": ((SCREW_X, SCREW_Y, -0.75), (SCREW_X, 0.359, -0.75), (0.10, 0.0, 0.10)),
+    "N10a": ((SCREW_X, SCREW_Y, -0.71), (SCREW_X, 0.359, -0.71), (0.10, 0.0, 0.10)),
     "N11": ((-0.38, 0.359, -1.15), (-0.38, 0.359, -1.15), (0.03, 0.0, 0.03)),
     "N12": ((0.27, 0.819, -1.08), (0.27, 0.819, -1.08), (0.05, 0.0, 0.05)),
     "N13": ((-0.38, 0.359, 1.05), (-0.38, 0.359, 1.05), (0.03, 0.0, 0.03)),
@@ -70,8 +72,8 @@ BED_NODES = {
     "N16": ((0.06, 0.0, -1.09), (0.06, 0.001, -1.09), (0.10, 0.0, 0.06)),
     "N17": ((-0.35, 0.0, 0.74), (-0.35, 0.001, 0.74), (0.05, 0.0, 0.05)),
     "N18": ((0.37, 0.0, 1.0), (0.37, 0.001, 1.0), (0.05, 0.0, 0.05)),
-    "N19a": ((SCREW_X, SCREW_Y, -0.44), (SCREW_X, 0.359, -0.44), (0.10, 0.0, 0.08)),
-    "N20a": ((SCREW_X, SCREW_Y, 0.44), (SCREW_X, 0.359, 0.44), (0.10, 0.0, 0.08)),
+    "N19a": ((SCREW_X, SCREW_Y, -0.40), (SCREW_X, 0.359, -0.40), (0.10, 0.0, 0.08)),
+    "N20a": ((SCREW_X, SCREW_Y, 0.40), (SCREW_X, 0.359, 0.40), (0.10, 0.0, 0.08)),
 }
 """Chosen: nodes of the bed: place, middle of the patch of the surface that they follow, half its size [m]."""
 TABLE_NODES = {
@@ -91,7 +93,7 @@ SCREW_ELASTIC = {"bending": 3, "axial": 2, "torsion": 2}
 """Elastic modes kept of the screw, bending in each plane."""
 
 
-def reference_arrays() -> dict[str, Float[np.ndarray, "..."]]:
+def reference_arrays() -> dict[str, Any]:
     """All arrays of the reference machine, named "component.what"; nodes in the order of their names here."""
     arrays: dict[str, Any] = {}
     for name, planes, kept, nodes in (("bed", BED, _bed, BED_NODES), ("table", TABLE, _table, TABLE_NODES)):
@@ -133,8 +135,8 @@ def _bed(centre: Float[np.ndarray, "3 boxes"]) -> Bool[np.ndarray, "boxes"]:
     x, y, z = centre
     side = (x < -0.39) | (x > 0.375)
     ribs = _in(z, -0.66, -0.62) | _in(z, -0.20, -0.16) | _in(z, 0.28, 0.32) | _in(z, 0.58, 0.62)
-    ends = (z < -1.16) | (z > 1.06)
-    feet = (_in(z, -1.16, -1.02) & _in(x, -0.12, 0.26)) | (_in(z, 0.62, 1.06) & ((x < -0.26) | (x > 0.26)))
+    ends = (z < -1.166) | (z > 1.06)
+    feet = (_in(z, -1.166, -1.02) & _in(x, -0.12, 0.26)) | (_in(z, 0.62, 1.06) & ((x < -0.26) | (x > 0.26)))
     lower = (y < 0.36) & (side | ends | (ribs & (y > 0.05)) | (feet & (y < 0.05)))
     ridges = _in(y, 0.36, 0.42) & (_in(x, -0.34, -0.26) | _in(x, 0.26, 0.34)) & _in(z, -0.66, 0.76)
     block = (y > 0.36) & (z < -0.86) & ((x > 0.12) | ((x > -0.12) & (y < 0.42)))

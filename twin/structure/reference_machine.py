@@ -6,6 +6,7 @@ size of parts in catalogues, chosen so that these statements hold and that each 
 """
 
 import functools
+from collections.abc import Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -28,37 +29,37 @@ MODES = 20
 
 LOSS_FACTOR = {"bed": 0.004, "table": 0.004, "screw": 0.003, "x_rotor": 0.003, "z_rotor": 0.003}
 """Chosen: material damping of the components [-]."""
-JOINT_LOSS_FACTOR = 0.005
+JOINT_LOSS_FACTOR = 0.008
 """Chosen, known: hysteretic damping of all joints but the mounting elements, as a share of their stiffness [-]."""
 MOUNTING = (
-    {"stiffness": (4.0e7, 7.0e7, 3.2e7), "viscous": (2.0e4, 1.6e4), "hysteretic": 7.0e6},
-    {"stiffness": (3.0e7, 5.5e7, 4.2e7), "viscous": (1.6e4, 2.2e4), "hysteretic": 5.5e6},
-    {"stiffness": (3.6e7, 4.6e7, 2.6e7), "viscous": (1.4e4, 1.3e4), "hysteretic": 4.0e6},
+    {"stiffness": (4.0e7, 8.0e7, 3.2e7), "viscous": (1.55e4, 7.0e3), "hysteretic": 8.0e6},
+    {"stiffness": (3.0e7, 7.0e7, 4.2e7), "viscous": (2.0e4, 2.2e4), "hysteretic": 6.5e6},
+    {"stiffness": (4.0e7, 6.0e7, 2.6e7), "viscous": (2.0e4, 1.4e4), "hysteretic": 5.0e6},
 )
 """Chosen: mounting elements 1 to 3: k_x, k_y, k_z [N/m], b_x, b_z [Ns/m], d_y [N/m]."""
 MOUNTING_REST = (2e4, 2e4, 1e4)
 """Chosen, known: stiffness of every mounting element about x, y, z [Nm/rad]."""
-FIXED_BEARING = {"x": 3.5e8, "y": 3.0e8, "z": 2.2e8, "rx": 4e5, "ry": 3.4e5}
+FIXED_BEARING = {"x": 5.0e8, "y": 4.5e8, "z": 2.2e8, "rx": 4e5, "ry": 3.4e5}
 """Chosen: fixed bearing [N/m, Nm/rad]; its k_z is unknown."""
-LOOSE_BEARING = {"x": 2.0e8, "y": 1.7e8}
+LOOSE_BEARING = {"x": 4.0e8, "y": 3.5e8}
 """Chosen, known: loose bearing [N/m]."""
-COUPLING = {"x": 4e6, "y": 5e6, "z": 8e6, "rx": 400.0, "ry": 500.0, "rz": 1.6e4}
+COUPLING = {"x": 4e6, "y": 5e6, "z": 8e6, "rx": 400.0, "ry": 500.0, "rz": 2.8e4}
 """Chosen: coupling [N/m, Nm/rad]; its k_rz is unknown."""
-COUPLING_LOSS = 800.0
+COUPLING_LOSS = 1300.0
 """Chosen: hysteretic damping d_rz of the coupling [Nm/rad]."""
-NUT = {"x": 2.5e8, "y": 2.2e8, "z": 2.8e8, "rx": 3e5, "ry": 2.5e5, "rz": 120.0}
+NUT = {"x": 5.0e8, "y": 4.5e8, "z": 2.8e8, "rx": 3e5, "ry": 2.5e5, "rz": 120.0}
 """Chosen: nut on the screw [N/m, Nm/rad]; k_z is unknown; rz replaces friction."""
 NUT_LOSS = 15.0
 """Chosen: hysteretic damping d_rz of the nut [Nm/rad]."""
 LEAD = 0.02
 """Chosen, known: lead of the screw [m per turn]."""
-GUIDE = {"x": 1.6e8, "y": 2.0e8, "z": 2.5e6, "rx": 1.2e6, "ry": 9e5, "rz": 3e5}
+GUIDE = {"x": 1.45e8, "y": 1.3e8, "z": 2.5e6, "rx": 1.2e6, "ry": 9e5, "rz": 3e5}
 """Chosen: guide shoe [N/m, Nm/rad]; k_x, k_y, k_rx, k_ry are unknown, z replaces friction."""
 Z_MOTOR_BEARING = {"x": 4e8, "y": 4e8, "z": 3e8, "rx": 4e6, "ry": 4e6}
 """Chosen, known: bearings of the z-motor [N/m, Nm/rad]."""
 X_MOTOR_BEARING = {"x": 4e8, "y": 5e8, "z": 5e8, "ry": 5e6, "rz": 5e6}
 """Chosen, known: bearings of the x-motor, which spins about x [N/m, Nm/rad]."""
-Z_BRAKE, X_BRAKE = 90.0, 7.2e4
+Z_BRAKE, X_BRAKE = 90.0, 4e5
 """Chosen, known: torsional stiffness of the brakes [Nm/rad]: that of the z-axis is open, friction remains; that of the
 x-axis is applied."""
 SHOE_OFFSETS = (-0.16, 0.16)
@@ -100,8 +101,10 @@ def reference_machine() -> Machine:
     arrays = _arrays()
     components = {}
     for name, nodes in NODES.items():
-        parts = (arrays[f"{name}.{what}"] for what in ("eigenvalues", "shapes", "positions"))
-        components[name] = Component(*parts, nodes, loss_factor=LOSS_FACTOR[name], rails=_rails(name))
+        values, shapes, positions = (arrays[f"{name}.{what}"] for what in ("eigenvalues", "shapes", "positions"))
+        components[name] = Component(
+            values, shapes, positions, nodes, loss_factor=LOSS_FACTOR[name], rails=_rails(name)
+        )
     masses = {
         name: LumpedMass(mass, component, node, *inertia) for name, (mass, component, node, inertia) in MASSES.items()
     }
@@ -124,10 +127,10 @@ def _rails(name: str) -> dict[str, Rail]:
 def _joints() -> dict[str, Joint]:
     joints = {}
     for number, (node, values) in enumerate(zip(("N16", "N17", "N18"), MOUNTING, strict=True), start=1):
-        (b_x, b_z), rest = values["viscous"], MOUNTING_REST
+        (k_x, k_y, k_z), (b_x, b_z), rest = values["stiffness"], values["viscous"], MOUNTING_REST
         joints[f"mounting_{number}"] = Joint(
             [(Attachment("bed", node), None)],
-            Directions(*values["stiffness"], *rest),
+            Directions(k_x, k_y, k_z, *rest),
             Directions(x=b_x, z=b_z),
             Directions(y=values["hysteretic"]),
         )
@@ -157,7 +160,7 @@ def _between(
 
 
 def _joint(
-    pairs: list[tuple[Attachment, Attachment | None]],
+    pairs: Sequence[tuple[Attachment, Attachment | None]],
     stiffness: dict[str, float],
     loss: dict[str, float] | None = None,
     lead: float = 0.0,

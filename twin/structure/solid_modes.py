@@ -79,8 +79,9 @@ def solid_modes(
     rigid = mass_normalised(rigid, mass)
     start = np.sin(np.arange(1.0, basis.N + 1))  # any vector, always the same
     shifted = splu(csc_matrix(stiffness + SHIFT * mass), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-    inverse = LinearOperator(shape=mass.shape, matvec=shifted.solve, dtype=np.dtype(np.float64))
-    values, vectors = eigsh(stiffness, 6 + elastic, mass, sigma=-SHIFT, OPinv=inverse, v0=start, tol=1e-12)
+    solve: Any = {"matvec": shifted.solve}
+    inverse = LinearOperator(shape=mass.shape, dtype=np.dtype(np.float64), **solve)
+    values, vectors = eigsh(stiffness, 6 + elastic, mass, sigma=-SHIFT, OPinv=inverse, v0=start)
     order = np.argsort(values)[6:]
     vectors = vectors[:, order]
     vectors = mass_normalised(vectors - rigid @ (rigid.T @ (mass @ vectors)), mass)

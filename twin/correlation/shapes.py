@@ -158,7 +158,7 @@ def _unit(shapes: Array) -> _Parts:
 
 
 def _defined(unit: _Parts) -> Array:
-    return sum(jnp.any(x != 0, axis=0) for x in unit) > 0
+    return jnp.any(jnp.concatenate(unit) != 0, axis=0)
 
 
 def _root(square: Array) -> Array:

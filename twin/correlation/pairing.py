@@ -37,7 +37,8 @@ def assign(alike: Float[ArrayLike, "..."], *, threshold: float = 0.3) -> PairedM
     The choice is not differentiated; `value` is.
 
     Args:
-        alike: likeness of each mode to each reference mode (modes, references), as `mac` and `macxp` give it; NaN where there is none.
+        alike: likeness of each mode to each reference mode (modes, references), as `mac` and `macxp` give it; NaN where
+            there is none.
         threshold: least value of a pair [-], between 0 and 1.
 
     Returns:

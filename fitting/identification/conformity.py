@@ -1,7 +1,7 @@
 """How far a model conforms with reference data: FRAC, CSF, MACXP and NDD over all responses and modes, as a table."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,7 +42,7 @@ class ConformityStatistics:
     csf: Statistics
     """Cross signature scale factor, one value for each FRF."""
     macxp: Statistics
-    """Extended modal assurance criterion, one value for each reference mode, also for those that could not be paired."""
+    """Extended modal assurance criterion, one value for each reference mode, paired or not."""
     ndd: Statistics
     """Size of the natural damping difference, one value for each pair of modes."""
     unpaired: int
@@ -146,13 +146,13 @@ def _likeness(name: str, values: ArrayLike) -> Statistics:
     array = np.asarray(values, dtype=float).ravel()
     if array.size == 0 or np.any(np.isnan(array)):
         raise InputError(
-            f"{name} has {array.size} values, {np.isnan(array).sum()} of them NaN, as those of a response or a shape that "
-            "is zero throughout. Leave such responses out."
+            f"{name} has {array.size} values, {np.isnan(array).sum()} of them NaN, as those of a response or a shape "
+            "that is zero throughout. Leave such responses out."
         )
     return _statistics(array, np.min, 5.0)
 
 
-def _statistics(values: np.ndarray, worst, percent: float) -> Statistics:
+def _statistics(values: np.ndarray, worst: Callable, percent: float) -> Statistics:
     if values.size == 0:
         return Statistics(np.nan, np.nan, np.nan, np.nan)
     found = (worst(values), np.percentile(values, percent), np.mean(values), np.median(values))

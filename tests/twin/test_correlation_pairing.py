@@ -70,6 +70,21 @@ def test_each_mode_is_given_away_once_best_first():
     assert not np.any(assign(np.zeros((2, 2)), threshold=0.0).paired)
 
 
+@pytest.mark.parametrize("size", [(7, 7), (4, 6), (6, 4)])
+def test_pairs_are_those_of_one_after_the_other(size):
+    """The plain loop: the largest entry left, its row and its column struck out."""
+    rng = np.random.default_rng(4)
+    batch = np.round(rng.random((60, *size)), 1)  # with ties
+    found = jax.jit(jax.vmap(lambda a: assign(a, threshold=0.0)))(batch)
+    for alike, pairs in zip(batch, found.order, strict=True):
+        left, expected = alike.T.copy(), np.full(size[1], -1)
+        for _ in range(min(size)):
+            row, column = np.unravel_index(np.argmax(left), left.shape)
+            expected[row] = column if left[row, column] > 0 else -1
+            left[row], left[:, column] = -1.0, -1.0
+        assert np.array_equal(pairs, expected)
+
+
 def test_rigid_body_modes_are_marked_and_leave_derivatives_alone():
     def value(factor):
         found = modes(chain(np.linspace(1.0, 2.0, N - 1) * factor, ground=0.0))

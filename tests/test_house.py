@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ROOMS = ("twin", "sensitivity", "fitting")
 FORBIDDEN = {"twin": {"sensitivity", "fitting"}, "sensitivity": {"fitting"}, "fitting": set()}
-CORE = ("laws", "drives", "control", "references", "modal", "structure")
+CORE = ("laws", "drives", "control", "references", "modal", "structure", "correlation")
 CORE_FILES = ("simulation.py", "linear.py", "frf.py", "frf_estimators.py", "response_estimate.py", "periodic.py")
 CORE_FILES += ("plant.py", "stepping.py", "trajectory.py")
 NOT_IN_CORE = {"matplotlib", "pandas", "SALib", "pooch", "tomlkit", "pint", "json", "pathlib", "os"}

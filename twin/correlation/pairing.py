@@ -31,13 +31,14 @@ class PairedModes(eqx.Module):
         return jnp.where(self.paired, values[..., jnp.maximum(self.order, 0)], jnp.nan)
 
 
-def assign(alike: Float[ArrayLike, "modes references"], *, threshold: float = 0.3) -> PairedModes:
+def assign(alike: Float[ArrayLike, "..."], *, threshold: float = 0.3) -> PairedModes:
     """Pair modes by any measure of likeness: the most alike pair first, each mode given away once.
 
     The choice is not differentiated; `value` is.
 
     Args:
-        alike: likeness of each mode to each reference mode, as `mac` and `macxp` give it; NaN where there is none.
+        alike: likeness of each mode to each reference mode (modes, references), as `mac` and `macxp` give it; NaN where
+            there is none.
         threshold: least value of a pair [-], between 0 and 1.
 
     Returns:

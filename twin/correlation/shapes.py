@@ -11,7 +11,7 @@ _Parts = tuple[Array, ...]
 """Real part of shapes, and imaginary part if they have one."""
 
 
-def mac(shapes: Inexact[ArrayLike, "rows ..."], reference: Inexact[ArrayLike, "rows ..."]) -> Float[Array, "..."]:
+def mac(shapes: Inexact[ArrayLike, "..."], reference: Inexact[ArrayLike, "rows ..."]) -> Float[Array, "..."]:
     """Modal assurance criterion |φ₁ᴴφ₂|² / (φ₁ᴴφ₁ · φ₂ᴴφ₂): squared cosine of shapes, whatever their scale and phase.
 
     All pairs of two matrices, or one pair of two vectors; pairs in step by `jax.vmap(mac, (1, 1))`.
@@ -37,9 +37,9 @@ def mac(shapes: Inexact[ArrayLike, "rows ..."], reference: Inexact[ArrayLike, "r
 
 
 def macxp(
-    shapes: Inexact[ArrayLike, "rows ..."],
+    shapes: Inexact[ArrayLike, "..."],
     eigenvalues: Inexact[ArrayLike, "..."],
-    reference: Inexact[ArrayLike, "rows ..."],
+    reference: Inexact[ArrayLike, "..."],
     reference_eigenvalues: Inexact[ArrayLike, "..."],
 ) -> Float[Array, "..."]:
     """Extended modal assurance criterion: likeness of two modes as free decays φ·e^(λt), shape and eigenvalue together.
@@ -158,7 +158,7 @@ def _unit(shapes: Array) -> _Parts:
 
 
 def _defined(unit: _Parts) -> Array:
-    return sum(jnp.any(x != 0, axis=0) for x in unit) > 0
+    return jnp.any(jnp.concatenate(unit) != 0, axis=0)
 
 
 def _root(square: Array) -> Array:

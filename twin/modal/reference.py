@@ -69,7 +69,7 @@ def reference_modes(
     Raises:
         InputError: an output or a mode that is not there.
     """
-    rows = output_rows(modes, modes.outputs if outputs is None else outputs)
+    rows = np.array(output_rows(modes, modes.outputs if outputs is None else outputs))
     number = modes.frequency.shape[-1]
     chosen = range(number) if indices is None else indices
     for i in chosen:
@@ -78,7 +78,7 @@ def reference_modes(
     kept = np.asarray(chosen, dtype=int)
     names = tuple(modes.outputs[i] for i in rows)
     return ReferenceModes(
-        modes.frequency[kept], modes.damping_ratio[kept], modes.output_shapes[np.ix_(rows, kept)], names
+        modes.frequency[kept], modes.damping_ratio[kept], modes.output_shapes[rows[:, None], kept], names
     )
 
 

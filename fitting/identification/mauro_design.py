@@ -28,7 +28,7 @@ _ERROR, _SENSITIVITY, _OVERSHOOT = 5e-6, 2.0, 1e-3
 _CONTROLLER = "loop.controller"
 # A tenth of a per mille of the cost is nothing beside what the model leaves open.
 _SOLVER = SLSQP(rtol=1e-4, atol=1e-5)
-_EVALUATIONS = 25
+_EVALUATIONS = 40
 
 
 @dataclasses.dataclass(frozen=True)

@@ -138,6 +138,9 @@ def summarise(structure: Structure, printed: PrintedCost, study: TableStudy, des
         },
         "fit": {
             "message": study.fit.message,
+            "steps": study.fit.steps,
+            "cost_at_the_start": float(study.fit.cost_history[0]),
+            "cost": study.fit.cost,
             "parameters": {
                 path: {
                     "value": float(study.fit.values[i]),

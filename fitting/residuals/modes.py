@@ -77,7 +77,7 @@ class ModesResidual(AbstractResidual):
         """
         if len(references) != len(positions) or not references:
             raise InputError(
-                f"There are {len(references)} sets of reference modes for {len(positions)} positions. Give one for each."
+                f"There are {len(references)} sets of reference modes for {len(positions)} positions. Give one each."
             )
         outputs = references[0].outputs
         for position, reference in zip(positions, references, strict=True):

@@ -10,7 +10,7 @@ from fitting.gain_objective import GainObjective
 from fitting.identification.mauro_design import gain_space
 from fitting.identification.mauro_study import rows_of
 from fitting.identification.mauro_table import OPTIMAL_GAIN
-from fitting.identification.mauro_twin import table_start
+from fitting.identification.mauro_twin import table_twin
 from fitting.optimal_design import design
 from fitting.solvers.slsqp import SLSQP
 from twin.io.units import to_si
@@ -28,7 +28,7 @@ def simulated(cycle: PositioningCycle) -> Trajectory:
 
 @pytest.mark.slow
 def test_gains_and_move_together():
-    twin = table_start()
+    twin = table_twin()
     cycle = twin.cycle(to_si(OPTIMAL_GAIN, "1/min", "1/s"), step=2e-4)
     objective = GainObjective.of_sweep(*rows_of(twin, step=2e-4))
     move = (

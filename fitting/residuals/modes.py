@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from fitting.residuals.residual import AbstractResidual
@@ -28,11 +27,12 @@ class ModesResidual(AbstractResidual):
     Log frequencies, mass-normalised shapes relative to the rms of the reference's, and log damping ratios, each over
     its standard deviation. Each reference mode is compared with the simulated mode that is most like it: by MACXP with
     so much damping that frequencies far apart do not hide a likeness of shapes. The pairing is not differentiated.
+    A mode that was not measured at some position is left out of its reference, or NaN in it.
 
     Raises:
-        InputError: no position, positions with different outputs or numbers of modes, shapes that are not real, a
-            reference mode without frequency or damping, a kind of evidence that is not known, a standard deviation that
-            is not positive; when called, a machine without one of the outputs.
+        InputError: no position, positions with different outputs, shapes that are not real, a reference mode without
+            frequency or damping, a kind of evidence that is not known, a standard deviation that is not positive; when
+            called, a machine without one of the outputs.
     """
 
     position: Float[Array, "positions"] = eqx.field(converter=as_array)
@@ -49,6 +49,8 @@ class ModesResidual(AbstractResidual):
     """Standard deviation of the shapes' entries, as a share of the rms of the shape [-]."""
     damping_deviation: Float[Array, ""] = eqx.field(converter=as_scalar)
     """Relative standard deviation of the damping ratios [-]."""
+    weight: Float[Array, "positions modes"] = eqx.field(converter=as_array)
+    """1 for a mode that counts, 0 for one that was not measured or is left out."""
     outputs: tuple[str, ...] = eqx.field(static=True)
     """Names "node direction" of the outputs."""
     kinds: tuple[str, ...] = eqx.field(static=True, default=KINDS)
@@ -81,27 +83,29 @@ class ModesResidual(AbstractResidual):
             )
         outputs = references[0].outputs
         for position, reference in zip(positions, references, strict=True):
-            if reference.outputs != outputs or reference.frequency.shape != references[0].frequency.shape:
+            if reference.outputs != outputs:
                 raise InputError(
-                    f"The modes at position {position:g} m have other outputs, or another number of modes, than those "
-                    "at the first position. Reduce all to the same by reference_modes; evidence with other modes is "
-                    "a ModesResidual of its own, joined by JointResidual."
+                    f"The modes at position {position:g} m have other outputs than those at the first position. Reduce "
+                    "all to the same ones by reference_modes(modes, outputs=...)."
                 )
             if jnp.iscomplexobj(reference.output_shapes):
                 raise InputError(
                     "The reference's shapes are complex. Turn each by its phase and take the real part: shapes of "
                     "lightly damped modes are real to first order."
                 )
+        most = max(r.frequency.size for r in references)
+        frequency, ratio, shapes, weight = zip(*(_padded(reference, most) for reference in references), strict=True)
         return cls(
-            jnp.asarray(positions, dtype=jnp.float64),
-            jnp.stack([r.frequency for r in references]),
-            jnp.stack([r.damping_ratio for r in references]),
-            jnp.stack([r.output_shapes for r in references]),
-            frequency_deviation,
-            shape_deviation,
-            damping_deviation,
-            outputs,
-            kinds,
+            position=jnp.asarray(positions, dtype=jnp.float64),
+            frequency=jnp.stack(frequency),
+            damping_ratio=jnp.stack(ratio),
+            shapes=jnp.stack(shapes),
+            frequency_deviation=as_scalar(frequency_deviation),
+            shape_deviation=as_scalar(shape_deviation),
+            damping_deviation=as_scalar(damping_deviation),
+            weight=jnp.stack(weight),
+            outputs=outputs,
+            kinds=kinds,
         )
 
     def __check_init__(self):
@@ -118,7 +122,7 @@ class ModesResidual(AbstractResidual):
 
     def __call__(self, model: Machine) -> Float[Array, "residuals"]:
         found = self.modes(model)
-        return jax.vmap(self._compared)(found, *self._reference()).ravel()
+        return jax.vmap(self._compared)(found, *self._reference(), self.weight).ravel()
 
     def modes(self, model: Machine) -> Modes:
         """The machine's modes at all positions and at the outputs measured, one batch.
@@ -134,19 +138,20 @@ class ModesResidual(AbstractResidual):
         Args:
             model: the machine.
         """
-        return jax.vmap(self._paired)(self.modes(model), *self._reference())
+        return jax.vmap(self._paired)(self.modes(model), *self._reference(), self.weight)
 
     def _reference(self) -> tuple[Array, Array, Array]:
         return self.frequency, self.damping_ratio, self.shapes
 
-    def _paired(self, found: Modes, frequency: Array, _: Array, shapes: Array) -> PairedModes:
+    def _paired(self, found: Modes, frequency: Array, _: Array, shapes: Array, weight: Array) -> PairedModes:
         wide, wide_ref = (eigenvalue_of(f, _WIDE) for f in (found.frequency, frequency))
         alike = marked_macxp(found.output_shapes, wide[:, None], shapes, wide_ref[None, :])
-        # Without a threshold: far from the reference a bad pair is what there is to improve.
-        return assign(jax.lax.stop_gradient(alike), threshold=0.0)
+        # Without a threshold: far from the reference a bad pair is what there is to improve. What does not count comes
+        # last, so that it takes no mode away.
+        return assign(jax.lax.stop_gradient(alike * jnp.where(weight > 0, 1.0, 1e-9)), threshold=0.0)
 
-    def _compared(self, found: Modes, frequency: Array, ratio: Array, shapes: Array) -> Array:
-        order = self._paired(found, frequency, ratio, shapes).order
+    def _compared(self, found: Modes, frequency: Array, ratio: Array, shapes: Array, weight: Array) -> Array:
+        order = self._paired(found, frequency, ratio, shapes, weight).order
         own = found.output_shapes[:, order]
         sign = jax.lax.stop_gradient(jnp.where(jnp.sum(own * shapes, axis=0) < 0, -1.0, 1.0))
         parts = {
@@ -154,7 +159,7 @@ class ModesResidual(AbstractResidual):
             "shape": (own * sign - shapes) / (self.shape_deviation * jnp.sqrt(jnp.mean(shapes**2, axis=0))),
             "damping": jnp.log(found.damping_ratio[order] / ratio) / self.damping_deviation,
         }
-        return jnp.concatenate([parts[kind].ravel() for kind in KINDS if kind in self.kinds])
+        return jnp.concatenate([(weight * parts[kind]).ravel() for kind in KINDS if kind in self.kinds])
 
 
 def eigenvalue_of(frequency: Float[Array, "..."], ratio: float) -> Array:
@@ -167,19 +172,14 @@ def eigenvalue_of(frequency: Float[Array, "..."], ratio: float) -> Array:
     return eigenvalue(frequency, jnp.full_like(frequency, ratio))
 
 
-def translations(nodes: Sequence[str]) -> tuple[str, ...]:
-    """Names of the translations in x, y, z at some nodes, as modal analysis measures them.
-
-    Args:
-        nodes: names of nodes.
-    """
-    return tuple(f"{node} {direction}" for node in nodes for direction in "xyz")
-
-
-def deviations(residual: ModesResidual) -> np.ndarray:
-    """Standard deviations of the three kinds of evidence, for reports [-].
-
-    Args:
-        residual: the evidence.
-    """
-    return np.asarray([residual.frequency_deviation, residual.shape_deviation, residual.damping_deviation])
+def _padded(reference: ReferenceModes, most: int) -> tuple[Array, Array, Array, Array]:
+    """Frequency, damping ratio, shapes and weight of as many modes as asked for; what is missing has weight zero."""
+    missing = most - reference.frequency.size
+    parts = (reference.frequency, reference.damping_ratio, reference.output_shapes)
+    present = jnp.isfinite(reference.frequency) & jnp.all(jnp.isfinite(reference.output_shapes), axis=0)
+    present &= jnp.isfinite(reference.damping_ratio)
+    full = [
+        jnp.pad(jnp.where(present, part, 1.0), [(0, 0)] * (part.ndim - 1) + [(0, missing)], constant_values=1.0)
+        for part in parts
+    ]
+    return full[0], full[1], full[2], jnp.pad(jnp.where(present, 1.0, 0.0), (0, missing))

@@ -106,7 +106,10 @@ def force_balance(
             kept[key] = np.concatenate([r for r, _ in parts]), np.concatenate([j for _, j in parts])
         return kept[key]
 
-    jacobian: Any = lambda x: balance(x)[1]  # SciPy's annotations know its name only as text
+    def slopes(vector: np.ndarray) -> np.ndarray:
+        return balance(vector)[1]
+
+    jacobian: Any = slopes  # SciPy's annotations know names of rules only
     found = least_squares(
         lambda x: balance(x)[0],
         np.clip(start, np.asarray(space.lower), np.asarray(space.upper)),

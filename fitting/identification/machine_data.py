@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from fitting.residuals.modes import ModesResidual
+from twin._checks import InputError
 from twin.modal import ReferenceModes, modes, reference_modes
 from twin.parameters import Parameter, ParameterSpace
 from twin.paths import get_leaf

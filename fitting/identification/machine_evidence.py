@@ -31,6 +31,15 @@ class Evidence:
         """Name of each reference mode: "mode 8 at +135 mm", counted from 1."""
         return tuple(f"mode {i + 1} at {1e3 * self.position:+.0f} mm" for i in range(self.omega.size))
 
+    def only(self, mode: int) -> "Evidence":
+        """One of the reference modes.
+
+        Args:
+            mode: its number, from 0.
+        """
+        kept = slice(mode, mode + 1)
+        return Evidence(self.position, self.omega[kept], self.ratio[kept], self.shapes[:, kept], self.outputs)
+
     def alike(
         self,
         eigenvalues: Float[np.ndarray, "samples n"],

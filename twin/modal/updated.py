@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from twin._small_systems import inverse_small
+from twin._small_systems import eliminated
 
 # Each step trebles the digits: from a shape some way off four are enough. At this error the eigenvalue is exact.
 _STEPS, _ERROR = 8, 1e-9
@@ -112,22 +112,46 @@ def _eigenpair_jvp(primals: tuple, tangents: tuple) -> tuple[tuple, tuple]:
 
 
 class Shifted(eqx.Module):
-    """(diag(λ₀) + B·diag(Δk)·Bᵀ - μI)⁻¹ by Woodbury's identity."""
+    """(diag(λ₀) + B·diag(Δk)·Bᵀ - μI)⁻¹ by Woodbury's identity, ready for one right-hand side."""
 
-    inverse: Array
-    vectors: Array
-    forces: Array
+    inverse: Float[Array, "n"]
+    """1/(λ₀ - μ) [s²]."""
+    vectors: Float[Array, "n springs"]
+    """B."""
+    change: Float[Array, "springs"]
+    """Δk [N/m]."""
+    small: Float[Array, "springs springs"]
+    """I + diag(Δk)·Bᵀ·diag(1/(λ₀ - μ))·B."""
 
     @classmethod
-    def of(cls, eigenvalues: Array, vectors: Array, change: Array, shift: Array) -> "Shifted":
+    def of(
+        cls,
+        eigenvalues: Float[Array, "n"],
+        vectors: Float[Array, "n springs"],
+        change: Float[Array, "springs"],
+        shift: Float[Array, ""],
+    ) -> "Shifted":
+        """The system at a shift μ [1/s²].
+
+        Args:
+            eigenvalues: λ₀ [1/s²].
+            vectors: B.
+            change: Δk [N/m].
+            shift: μ [1/s²]; the solution grows without bound as it comes near an eigenvalue.
+        """
         inverse = 1 / (eigenvalues - shift)
         flexible = vectors.T @ (inverse[:, None] * vectors)
-        small = jnp.eye(change.size) + change[:, None] * flexible
-        return cls(inverse, vectors, inverse_small(small[..., None])[..., 0] * change)
+        return cls(inverse, vectors, change, jnp.eye(change.size) + change[:, None] * flexible)
 
-    def solve(self, right: Array) -> Array:
+    def solve(self, right: Float[Array, "n"]) -> Float[Array, "n"]:
+        """The solution x of (K - μI)·x = b.
+
+        Args:
+            right: b.
+        """
         moved = self.inverse * right
-        return moved - self.inverse * (self.vectors @ (self.forces @ (moved @ self.vectors)))
+        forces = eliminated(self.small[..., None], (self.change * (moved @ self.vectors))[:, None, None])[:, 0, 0]
+        return moved - self.inverse * (self.vectors @ forces)
 
 
 def _times(eigenvalues: Array, vectors: Array, change: Array, shape: Array) -> Array:

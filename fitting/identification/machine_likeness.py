@@ -17,6 +17,8 @@ from twin.modal.updated import Shifted, updated_mode
 _SHIFT = 1e-7
 # Least 1 - MACXP: its root has a derivative there, and what is below is rounding.
 _LEAST = 1e-16
+# Error of the eigenpair ‖Kφ - λφ‖/λ up to which it is one.
+_ERROR = 1e-6
 
 
 class PartData(eqx.Module):
@@ -67,7 +69,7 @@ def unlikeness(share: Float[Array, "parameters"], data: PartData) -> tuple[Array
         data: the problem.
 
     Returns:
-        1 - MACXP and its derivatives by the shares.
+        1 - MACXP, NaN where the iteration found no mode, and its derivatives by the shares.
     """
     change = (share[data.owner] - 0.5) * data.weight
     mode = updated_mode(data.eigenvalues, data.vectors, change, data.start, data.omega**2)
@@ -91,21 +93,26 @@ def unlikeness(share: Float[Array, "parameters"], data: PartData) -> tuple[Array
     stretch = shape @ data.vectors
     per_row = (per_value * stretch - adjoint @ data.vectors) * stretch * data.weight
     slope = jnp.sum(jnp.where(data.owner[:, None] == jnp.arange(share.size), per_row[:, None], 0.0), axis=0)
-    return 1 - likeness(mac, value), -slope
+    # What is no mode has no likeness: the solver then takes a shorter step.
+    return jnp.where(mode.error < _ERROR, 1 - likeness(mac, value), jnp.nan), -slope
 
 
 def _times(data: PartData, change: Array, shape: Array) -> Array:
     return data.eigenvalues * shape + data.vectors @ (change * (shape @ data.vectors))
 
 
+def _root(value: Array) -> Array:
+    return jnp.sqrt(2 * jnp.maximum(value, _LEAST))
+
+
 @jax.custom_jvp
 def _residual(share: Array, data: PartData) -> Array:
-    return jnp.sqrt(2 * jnp.maximum(unlikeness(share, data)[0], _LEAST))
+    return _root(unlikeness(share, data)[0])
 
 
 @_residual.defjvp
 def _residual_jvp(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
     (share, data), (d_share, _) = primals, tangents
     value, slope = unlikeness(share, data)
-    residual = jnp.sqrt(2 * jnp.maximum(value, _LEAST))
+    residual = _root(value)
     return residual, slope @ d_share / residual

@@ -18,8 +18,8 @@ from twin.parameters import ParameterSpace
 if TYPE_CHECKING:
     import pandas as pd
 
-# Cost that the run's own mode may be above that of the most alike mode by rounding.
-_SAME = 1e-8
+# Difference of MACXP between the mode followed and the one most alike that is rounding.
+_SAME = 1e-7
 # Share of its range at which a parameter counts as on its bound.
 _BOUND = 1e-4
 
@@ -51,13 +51,55 @@ class PartRuns:
 
     @property
     def strayed(self) -> Bool[np.ndarray, "problems runs"]:
-        """Runs that followed another mode than the one most like the reference mode."""
-        return self.macxp > self.followed + _SAME
+        """Runs whose mode is not, among all modes of the machine, the one most like the reference mode."""
+        return np.abs(self.macxp - self.followed) > _SAME
 
     @property
     def failed(self) -> Bool[np.ndarray, "problems runs"]:
         """Runs that did not converge, or that strayed: they count for nothing."""
         return ~np.isin(self.stop, CONVERGED) | self.strayed | ~np.isfinite(self.macxp)
+
+    @property
+    def on_bound(self) -> Bool[np.ndarray, "problems runs stiffnesses"]:
+        """Which searched stiffnesses ended on a bound."""
+        bounds = np.asarray([(p.lower, p.upper) for p in self.space.parameters])[self.stiffness]
+        share = (self.value - bounds[:, 0]) / (bounds[:, 1] - bounds[:, 0])
+        return ((share < _BOUND) | (share > 1 - _BOUND)) & self.searched[:, None, :]
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Paths of the stiffnesses."""
+        return tuple(self.space.paths[i] for i in self.stiffness)
+
+    def to_dataframe(self) -> "pd.DataFrame":
+        """One row per run: its problem, start and end of the stiffnesses searched (others NaN), MACXP, why it ended."""
+        import pandas as pd
+
+        problems, runs = self.macxp.shape
+        searched = np.repeat(self.searched[:, None], runs, axis=1)
+        columns = {"problem": np.repeat(self.problems, runs), "run": np.tile(np.arange(runs), problems)}
+        for i, path in enumerate(self.paths):
+            columns[path] = np.where(searched, self.value, np.nan)[..., i].ravel()
+        last = {"macxp": self.macxp, "stop": self.stop, "steps": self.steps, "failed": self.failed}
+        return pd.DataFrame(columns | {name: array.ravel() for name, array in last.items()})
+
+    def summary(self) -> "pd.DataFrame":
+        """One row per problem: how many stiffnesses it searched, its MACXP, and how many of its runs failed."""
+        import pandas as pd
+
+        rows = {
+            "searched": self.searched.sum(axis=1),
+            "macxp median": np.nanmedian(self.macxp, axis=1),
+            "macxp best": np.nanmax(self.macxp, axis=1),
+            "steps": self.steps.mean(axis=1),
+            "strayed": self.strayed.sum(axis=1),
+            "failed": self.failed.sum(axis=1),
+        }
+        return pd.DataFrame(rows, index=pd.Index(self.problems, name="problem"))
+
+    def __repr__(self) -> str:
+        count = f"{self.failed.sum()} of {self.failed.size} runs failed, {self.strayed.sum()} of them on another mode"
+        return f"{self.summary().to_string(float_format=lambda x: f'{x:.4g}')}\n{count}."
 
 
 def best_macxp(

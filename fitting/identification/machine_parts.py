@@ -3,14 +3,13 @@
 Source: section 2.3.2 of J. Ellinger, M. F. Zaeh, Machines 10 (2022) 535.
 """
 
-import dataclasses
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
 from fitting.blas_threads import one_blas_thread
 from fitting.identification.machine_affine import AffineMachine, affine_machine
@@ -30,16 +29,6 @@ _SIZES = (3, 5, 9, 16)
 # Weight of the strain energy where a reference shape is expanded to unmeasured coordinates.
 _STRAIN = 1e-6
 _CHUNK = 100
-
-
-@dataclasses.dataclass(frozen=True)
-class Draws:
-    """Random values of all stiffnesses in all runs, as shares of the way between their bounds."""
-
-    start: Float[np.ndarray, "problems starts stiffnesses"]
-    """Where the searched ones start and the others stay."""
-    searched: Bool[np.ndarray, "problems stiffnesses"]
-    """Which are searched in each problem."""
 
 
 def solve_parts(
@@ -96,7 +85,7 @@ def solve_parts(
     found, steps, followed = values.copy(), np.zeros((count, starts), dtype=int), np.full((count, starts), np.nan)
     stop = np.full((count, starts), "nothing_searched", dtype=object)
     least = 0
-    solver = SLSQP(rtol=0.0, atol=1e-10, history_length=1) if solver is None else solver
+    solver = SLSQP(rtol=0.0, atol=1e-8, history_length=1) if solver is None else solver
     for size in sorted({*_SIZES, mask.shape[1]}):
         chosen = np.flatnonzero((mask.sum(axis=1) > least) & (mask.sum(axis=1) <= size))
         least = max(least, size)

@@ -67,9 +67,7 @@ class AffineMachine:
         return known, strokes * scale
 
 
-def affine_machine(
-    machine: Machine, space: ParameterSpace, position: float, outputs: Sequence[str]
-) -> AffineMachine:
+def affine_machine(machine: Machine, space: ParameterSpace, position: float, outputs: Sequence[str]) -> AffineMachine:
     """The matrices of a machine at a position, taken apart by its unknown springs and dampers.
 
     Args:
@@ -125,5 +123,3 @@ def affine_machine(
 
 def _rows_of(owner: np.ndarray, owners: np.ndarray) -> list[np.ndarray]:
     return [np.flatnonzero(owner == i) for i in range(len(owners))]
-
-

@@ -88,7 +88,11 @@ def _one(modes: ReferenceModes, position: float, outputs: tuple[str, ...]) -> Ev
     shapes = np.asarray(modes.output_shapes)
     if np.iscomplexobj(shapes):
         raise InputError(f"{where} are complex. Turn each by its phase and take the real part.")
-    frequency, ratio, length = np.asarray(modes.frequency), np.asarray(modes.damping_ratio), np.linalg.norm(shapes, axis=0)
+    frequency, ratio, length = (
+        np.asarray(modes.frequency),
+        np.asarray(modes.damping_ratio),
+        np.linalg.norm(shapes, axis=0),
+    )
     bad = ~((frequency > 0) & (ratio > 0) & (ratio < 1) & (length > 0))  # NaN is bad, too
     if bad.any() or frequency.size == 0:
         i = int(np.argmax(bad)) if bad.size else -1

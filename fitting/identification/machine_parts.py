@@ -92,11 +92,11 @@ def solve_parts(
         if chosen.size == 0:
             continue
         rows = max(int(mask[i][owner[i][0].spring_of].sum()) for i in chosen)
-        tasks = [(*owner[i], mask[i], values[i], bounds, size, rows) for i in chosen]
+        tasks = [(*owner[i], mask[i], values[i], bounds, rows) for i in chosen]
         with one_blas_thread(), ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
             made = list(pool.map(_prepared, tasks))
         common = PartData(*(jnp.asarray(leaf[0]) for leaf in made[0]))
-        stacked = PartData(*(np.concatenate(leaves) for leaves in zip(*made, strict=True)))
+        stacked = tuple(np.concatenate(leaves) for leaves in zip(*made, strict=True))
         first = np.concatenate([_padded(drawn[i][:, mask[i]], size) for i in chosen])
         upper = np.concatenate([np.tile(np.arange(size) < mask[i].sum(), (starts, 1)) for i in chosen])
         free = ParameterSpace([Parameter(f"share.{i}", "", 0.0, 1.0, size=1.0) for i in range(size)])
@@ -120,17 +120,17 @@ def solve_parts(
     return PartRuns(space, parts[0].stiffness, problems, mask, values, found, macxp, followed, stop, steps)
 
 
-def _own(objective: Objective, data: PartData) -> Objective:
-    return Objective(Unlikeness(data), objective.model, objective.space)
+def _own(objective: Objective, data: tuple) -> Objective:
+    return Objective(Unlikeness(PartData(*data)), objective.model, objective.space)
 
 
 def _padded(shares: np.ndarray, size: int) -> np.ndarray:
     return np.concatenate([shares, np.full((len(shares), size - shares.shape[1]), 0.5)], axis=1)
 
 
-def _prepared(task: tuple[AffineMachine, Evidence, int, np.ndarray, np.ndarray, np.ndarray, int, int]) -> tuple:
+def _prepared(task: tuple[AffineMachine, Evidence, int, np.ndarray, np.ndarray, np.ndarray, int]) -> tuple:
     """What `PartData` holds, for all runs of one problem."""
-    part, one, mode, searched, values, bounds, size, rows = task
+    part, one, mode, searched, values, bounds, rows = task
     runs, n = len(values), len(part.fixed)
     middle = np.where(searched, bounds.mean(axis=1), values)
     eigenvalues, basis = np.linalg.eigh(part.stiffness_matrices(middle))

@@ -5,11 +5,13 @@ they add to the damping ratios is linear in them.
 """
 
 import dataclasses
+import functools
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -50,10 +52,10 @@ class MachineSensitivity:
         return self.indices.ST[[self.indices.index(f"{kind} {name}") for name in self.problems]]
 
     def searched(self, threshold: float = 0.01, *, interval: bool = False) -> np.ndarray:
-        """Which parameters are searched for each reference mode: those whose total effect on MACXP is above a threshold.
+        """Which parameters are searched for each reference mode: by their total effect on MACXP.
 
         Args:
-            threshold: total effect; 1 % in the paper.
+            threshold: total effect above which a parameter is searched; 1 % in the paper.
             interval: search also those whose confidence interval reaches above it.
 
         Returns:
@@ -137,7 +139,9 @@ def mode_outputs(
     stiffness = distinct.values[:, kinds.stiffness]
     dampings = samples.values[:, kinds.damping]
     starts = range(0, len(stiffness), _CHUNK)
-    tasks = [(part, one, stiffness[i : i + _CHUNK], threshold) for part, one in zip(parts, data, strict=True) for i in starts]
+    tasks = [
+        (part, one, stiffness[i : i + _CHUNK], threshold) for part, one in zip(parts, data, strict=True) for i in starts
+    ]
     with one_blas_thread(), ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         done = list(pool.map(_solved, tasks))
     shape, damping, missing = [], [], []
@@ -170,11 +174,11 @@ def _paired(alike: Float[np.ndarray, "samples n references"], threshold: float) 
     with jax.enable_x64(True):
         full = np.zeros((_CHUNK, *alike.shape[1:]))
         full[: len(alike)] = alike
-        order, paired = _assigned(full, threshold)
+        order, paired = _assigned(jnp.asarray(full), float(threshold))
         return np.asarray(order)[: len(alike)], np.asarray(paired)[: len(alike)]
 
 
-@jax.jit
-def _assigned(alike: jax.Array, threshold: jax.Array) -> tuple[jax.Array, jax.Array]:
+@functools.partial(jax.jit, static_argnums=1)
+def _assigned(alike: jax.Array, threshold: float) -> tuple[jax.Array, jax.Array]:
     pairs = jax.vmap(lambda one: assign(one, threshold=threshold))(alike)
     return pairs.order, pairs.paired

@@ -69,8 +69,9 @@ def unknowns(space: ParameterSpace) -> Unknowns:
         parts = parameter.path.split(".")
         if len(parts) != 4 or parts[0] != "joints" or parts[2] not in (STIFFNESS, VISCOUS, HYSTERETIC):
             raise InputError(
-                f"{parameter.path!r} is no stiffness or damping of a joint. Search joints.<name>.stiffness.<direction>, "
-                "and viscous or hysteretic in its place; others are no linear part of the machine's matrices."
+                f"{parameter.path!r} is no stiffness or damping of a joint. Search "
+                "joints.<name>.stiffness.<direction>, and viscous or hysteretic in its place; others are no linear "
+                "part of the machine's matrices."
             )
         if parameter.tied:
             raise InputError(f"{parameter.path!r} is tied to {parameter.tied[0]!r}. Give each place the same joint.")

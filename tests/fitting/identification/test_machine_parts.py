@@ -162,16 +162,13 @@ def test_bad_problems_are_refused():
 def test_runs_find_the_truth_and_a_planted_wrong_mode_is_found_out(monkeypatch):
     """Also that problems without a stiffness to search are marked, and dampings are not searched."""
     kinds = unknowns(space())
-    own = ParameterSpace(
-        [
-            Parameter(
-                p.path,
-                p.unit,
-                *((p.lower, p.upper) if i in SEARCHED[:3] else (float(v) * 0.999999, float(v) * 1.000001)),
-            )
-            for i, (p, v) in enumerate(zip(space().parameters, true_values(), strict=True))
-        ]
-    )
+    values = [float(value) for value in true_values()]
+
+    def bounds(number, parameter):
+        free = number in SEARCHED[:3]
+        return (parameter.lower, parameter.upper) if free else (0.999999 * values[number], 1.000001 * values[number])
+
+    own = ParameterSpace([Parameter(p.path, p.unit, *bounds(i, p)) for i, p in enumerate(space().parameters)])
     mask = mask_of({1: SEARCHED[:3], 2: (*SEARCHED[:3], int(kinds.damping[0]))})
     found = solve_parts(nominal(), measured(), PLACES, own, mask, seed=4, starts=6)
     assert np.all(found.stop[0] == "nothing_searched") and found.failed[0].all()

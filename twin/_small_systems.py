@@ -64,9 +64,23 @@ def _product(left: Array, right: Array) -> Array:
 
 def _inverse(matrices: Array) -> Array:
     """A⁻¹ by Gauss and Jordan's elimination, with row exchanges."""
+    identity = jnp.broadcast_to(jnp.eye(matrices.shape[0], dtype=matrices.dtype)[..., None], matrices.shape)
+    return eliminated(matrices, identity)
+
+
+def eliminated(
+    matrices: Inexact[Array, "n n systems"], right: Inexact[Array, "n columns systems"]
+) -> Inexact[Array, "n columns systems"]:
+    """Solutions by Gauss and Jordan's elimination with row exchanges, whatever the size, without LAPACK.
+
+    Half the work of the inverse for one right-hand side.
+
+    Args:
+        matrices: A.
+        right: B.
+    """
     n = matrices.shape[0]
     row = jnp.arange(n)
-    identity = jnp.broadcast_to(jnp.eye(n, dtype=matrices.dtype)[..., None], matrices.shape)
 
     def eliminate(j: Array, work: Array) -> Array:
         column = work[:, j]
@@ -78,4 +92,4 @@ def _inverse(matrices: Array) -> Array:
         others = jnp.where((row == j)[:, None], 0.0, work[:, j])
         return (work - others[:, None] * pivot_row).at[j].set(pivot_row)
 
-    return jax.lax.fori_loop(0, n, eliminate, jnp.concatenate([matrices, identity], axis=1))[:, n:]
+    return jax.lax.fori_loop(0, n, eliminate, jnp.concatenate([matrices, right], axis=1))[:, n:]

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from twin._small_systems import inverse_small
+from twin._small_systems import eliminated
 
 # Each step trebles the digits: from a shape some way off four are enough. At this error the eigenvalue is exact.
 _STEPS, _ERROR = 8, 1e-9
@@ -34,6 +34,7 @@ def updated_mode(
     vectors: Float[Array, "n springs"],
     change: Float[Array, "springs"],
     start: Float[Array, "n"],
+    near: Float[Array, ""] | None = None,
 ) -> UpdatedMode:
     """The mode that Rayleigh-quotient iteration finds from a start; differentiable forward in all but the start.
 
@@ -45,13 +46,25 @@ def updated_mode(
         vectors: of each spring its stretch in each of these modes, mass-normalised, B.
         change: of each spring the change of its stiffness Δk [N/m].
         start: coordinates in these modes of a shape to begin with; need not be normalised.
+        near: eigenvalue to begin near [1/s²]. If given, the first step picks, from a start that is a mixture of modes,
+            those that are near to it; if not, it begins with the Rayleigh quotient of the start.
 
     Returns:
         The eigenpair. Derivatives are those of a distinct eigenvalue.
     """
-    value, shape = _eigenpair(eigenvalues, vectors, change, jax.lax.stop_gradient(start))
+    start = jax.lax.stop_gradient(start)
+    if near is not None:
+        start = _picked(eigenvalues, vectors, change, start, near)
+    value, shape = _eigenpair(eigenvalues, vectors, change, start)
     rest = _times(eigenvalues, vectors, change, shape) - value * shape
     return UpdatedMode(value, shape, jax.lax.stop_gradient(jnp.linalg.norm(rest) / jnp.abs(value)))
+
+
+def _picked(eigenvalues: Array, vectors: Array, change: Array, start: Array, near: Array) -> Array:
+    picked = Shifted.of(eigenvalues, vectors, change, near).solve(start)
+    usable = jnp.all(jnp.isfinite(picked)) & jnp.any(picked != 0)
+    # The sign of a mode is that of its part of the start.
+    return jax.lax.stop_gradient(jnp.where(usable, jnp.where(picked @ start < 0, -picked, picked), start))
 
 
 @jax.custom_jvp
@@ -64,7 +77,7 @@ def _eigenpair(eigenvalues: Array, vectors: Array, change: Array, start: Array) 
     def step(carry: tuple) -> tuple:
         count, value, shape, _ = carry
         # Exactly at an eigenvalue there is no solution: step aside by rounding.
-        solved = _Shifted.of(eigenvalues, vectors, change, value * (1 + 1e-13) + 1e-300).solve(shape)
+        solved = Shifted.of(eigenvalues, vectors, change, value * (1 + 1e-13) + 1e-300).solve(shape)
         usable = jnp.all(jnp.isfinite(solved)) & jnp.any(solved != 0)
         solved = jnp.where(usable, solved / jnp.linalg.norm(solved), shape)
         return count + 1, *_after(solved, value_and_error(solved))
@@ -89,7 +102,7 @@ def _eigenpair_jvp(primals: tuple, tangents: tuple) -> tuple[tuple, tuple]:
     pushed = pushed + d_vectors @ (change * stretch) + vectors @ (change * (shape @ d_vectors))
     d_value = shape @ pushed
     right = d_value * shape - pushed
-    beside = _Shifted.of(eigenvalues, vectors, change, value * (1 - _SHIFT))
+    beside = Shifted.of(eigenvalues, vectors, change, value * (1 - _SHIFT))
     turned = jnp.zeros_like(shape)
     for _ in range(_ROUNDS + 1):
         left = right - (_times(eigenvalues, vectors, change, turned) - value * turned)
@@ -98,23 +111,47 @@ def _eigenpair_jvp(primals: tuple, tangents: tuple) -> tuple[tuple, tuple]:
     return (value, shape), (d_value, turned)
 
 
-class _Shifted(eqx.Module):
-    """(diag(λ₀) + B·diag(Δk)·Bᵀ - μI)⁻¹ by Woodbury's identity."""
+class Shifted(eqx.Module):
+    """(diag(λ₀) + B·diag(Δk)·Bᵀ - μI)⁻¹ by Woodbury's identity, ready for one right-hand side."""
 
-    inverse: Array
-    vectors: Array
-    forces: Array
+    inverse: Float[Array, "n"]
+    """1/(λ₀ - μ) [s²]."""
+    vectors: Float[Array, "n springs"]
+    """B."""
+    change: Float[Array, "springs"]
+    """Δk [N/m]."""
+    small: Float[Array, "springs springs"]
+    """I + diag(Δk)·Bᵀ·diag(1/(λ₀ - μ))·B."""
 
     @classmethod
-    def of(cls, eigenvalues: Array, vectors: Array, change: Array, shift: Array) -> "_Shifted":
+    def of(
+        cls,
+        eigenvalues: Float[Array, "n"],
+        vectors: Float[Array, "n springs"],
+        change: Float[Array, "springs"],
+        shift: Float[Array, ""],
+    ) -> "Shifted":
+        """The system at a shift μ [1/s²].
+
+        Args:
+            eigenvalues: λ₀ [1/s²].
+            vectors: B.
+            change: Δk [N/m].
+            shift: μ [1/s²]; the solution grows without bound as it comes near an eigenvalue.
+        """
         inverse = 1 / (eigenvalues - shift)
         flexible = vectors.T @ (inverse[:, None] * vectors)
-        small = jnp.eye(change.size) + change[:, None] * flexible
-        return cls(inverse, vectors, inverse_small(small[..., None])[..., 0] * change)
+        return cls(inverse, vectors, change, jnp.eye(change.size) + change[:, None] * flexible)
 
-    def solve(self, right: Array) -> Array:
+    def solve(self, right: Float[Array, "n"]) -> Float[Array, "n"]:
+        """The solution x of (K - μI)·x = b.
+
+        Args:
+            right: b.
+        """
         moved = self.inverse * right
-        return moved - self.inverse * (self.vectors @ (self.forces @ (moved @ self.vectors)))
+        forces = eliminated(self.small[..., None], (self.change * (moved @ self.vectors))[:, None, None])[:, 0, 0]
+        return moved - self.inverse * (self.vectors @ forces)
 
 
 def _times(eigenvalues: Array, vectors: Array, change: Array, shape: Array) -> Array:

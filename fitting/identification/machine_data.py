@@ -1,4 +1,4 @@
-"""Modal data of a machine: what is measured where, and what is searched in which bounds."""
+"""Modal data of a machine: what is measured where, with what noise, and what of the machine is not exactly known."""
 
 from collections.abc import Sequence
 
@@ -10,31 +10,9 @@ from fitting.residuals.modes import ModesResidual
 from twin._checks import InputError
 from twin.modal import ReferenceModes, modes, reference_modes
 from twin.parameters import Parameter, ParameterSpace
-from twin.paths import get_leaf
 from twin.structure import Machine
 from twin.structure.reference_machine import MODES
-from twin.structure.reference_quantities import UNKNOWN, Quantity
-
-STIFFNESS_BOUNDS = (0.7, 1.3)
-"""Bounds of a stiffness, as shares of its nominal value; eq. 14."""
-DAMPING_BOUNDS = (1 / 3, 3.0)
-"""Bounds of a damping, as shares of its nominal value; eq. 14."""
-
-
-def unknown_space(machine: Machine, unknown: Sequence[Quantity] = UNKNOWN) -> ParameterSpace:
-    """The searched parameters within the bounds of eq. 14, on a logarithmic scale.
-
-    Args:
-        machine: machine with the nominal values.
-        unknown: quantities of kind stiffness, viscous or hysteretic.
-    """
-
-    def parameter(quantity: Quantity) -> Parameter:
-        nominal = float(get_leaf(machine, quantity.path))
-        lower, upper = STIFFNESS_BOUNDS if quantity.kind == "stiffness" else DAMPING_BOUNDS
-        return Parameter(quantity.path, quantity.unit, lower * nominal, upper * nominal, scale="log")
-
-    return ParameterSpace([parameter(quantity) for quantity in unknown])
+from twin.structure.reference_quantities import Quantity
 
 
 def stiffness_space(space: ParameterSpace) -> ParameterSpace:

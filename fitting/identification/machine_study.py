@@ -9,7 +9,8 @@ import numpy as np
 
 from fitting.identification.conformity import ConformityStatistics, conformity
 from fitting.identification.machine import MachineIdentification, identify_machine
-from fitting.identification.machine_data import measured_modes, noisy, nuisance_space, translations, unknown_space
+from fitting.identification.machine_data import measured_modes, noisy, nuisance_space, translations
+from fitting.identification.machine_unknowns import unknown_space
 from twin.frf import FRF
 from twin.linear import frequency_response
 from twin.parameters import ParameterSpace
@@ -179,7 +180,7 @@ def permuted_damping(model: Machine, truth: Machine, seed: int = 1) -> Machine:
 
 
 def _space() -> ParameterSpace:
-    return unknown_space(reference_machine())
+    return unknown_space(reference_machine(), scale="log")
 
 
 @eqx.filter_jit

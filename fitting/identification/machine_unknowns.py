@@ -37,12 +37,13 @@ class Unknowns(NamedTuple):
         return np.flatnonzero(self.kind != STIFFNESS)
 
 
-def unknown_space(machine: Machine) -> ParameterSpace:
+def unknown_space(machine: Machine, *, scale: str = "linear") -> ParameterSpace:
     """The 27 unknowns of the reference machine, within the intervals of eq. 14 around a machine's values.
 
     Args:
         machine: machine with the reference machine's joints; its values are the middle, not the bounds' mean for
             dampings.
+        scale: "linear" for problems whose starts are uniform in the values, "log" for joint fits.
 
     Returns:
         The space: stiffnesses between 0.7 and 1.3 times the value, dampings between a third and three times.
@@ -51,7 +52,7 @@ def unknown_space(machine: Machine) -> ParameterSpace:
     for quantity in UNKNOWN:
         low, high = STIFFNESS_INTERVAL if quantity.kind == STIFFNESS else DAMPING_INTERVAL
         value = float(get_leaf(machine, quantity.path))
-        parameters.append(Parameter(quantity.path, quantity.unit, low * value, high * value))
+        parameters.append(Parameter(quantity.path, quantity.unit, low * value, high * value, scale=scale))
     return ParameterSpace(parameters)
 
 

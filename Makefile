@@ -4,13 +4,16 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.synced
 
-.PHONY: demo test bench lint types notebooks lock clean
+.PHONY: demo test slow bench lint types notebooks lock clean
 
 demo: $(STAMP)
 	$(BIN)/drivetwin demo --out out/demo
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -n 2 --dist worksteal -q tests
+	$(BIN)/python -m pytest -n 2 --dist loadfile -q -m "not slow" tests
+
+slow: $(STAMP)
+	$(BIN)/python -m pytest -n 2 --dist loadfile -q -m slow tests
 
 bench: $(STAMP)
 	$(BIN)/python -m tests.benchmarks.run --out out/bench

@@ -85,6 +85,7 @@ def test_kinds_agree_for_small_errors():
     np.testing.assert_allclose(turned / phase, second[:120] + 1j * second[120:], atol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["complex", "log"])
 def test_jacobian_of_the_residual_agrees_with_central_differences(kind):
     model = drive()
@@ -126,6 +127,7 @@ def test_closed_form_start_is_close_without_noise_and_with_it():
         assert float(start.model.delay) == pytest.approx(1.1e-4, rel=10 * tolerance)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["complex", "log"])
 def test_exact_data_give_the_exact_parameters(kind):
     found = identify_two_mass(measured(), kind=kind)
@@ -151,6 +153,7 @@ def test_standard_errors_of_the_modes_match_their_scatter(batch):
     np.testing.assert_allclose(scatter / found[..., 1].mean(axis=0), 1.0, atol=0.25)
 
 
+@pytest.mark.slow
 def test_a_damping_on_its_bound_leaves_the_modes_with_standard_errors():
     found = identify_two_mass(measured(0.02, seed=6, model=drive(0.0)))
     assert found.result.success
@@ -166,6 +169,7 @@ def test_linear_systems_are_fitted_by_their_own_response():
     assert np.all(np.asarray(found) == 0)
 
 
+@pytest.mark.slow
 def test_unusable_measurements_are_named():
     data = measured()
     bare = FRF(data.frequency, data.values, data.outputs, data.inputs)

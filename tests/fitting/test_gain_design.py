@@ -21,6 +21,7 @@ from twin.sweep import sweep
 MEASURES = PositioningPerformance(*(jnp.asarray(v) for v in ([1e-3, -2e-3, 0.0], [20.0, 15.0, 30.0], [0.2, 0.3, 0.15])))
 
 
+@pytest.mark.slow
 def test_reaches_the_optimum_of_a_fine_sweep_in_fewer_runs_than_a_coarse_one():
     fine = sweep(CYCLE, cycle_performance, {GAIN: np.geomspace(8.0, 120.0, 1001)}, batch_size=143)
     costs = OBJECTIVE.sharp_cost(PositioningPerformance(*(jnp.asarray(fine[n]) for n in ("error", "energy", "time"))))
@@ -60,6 +61,7 @@ def test_references_of_a_sweep():
         GainObjective.of_sweep(*(jnp.nan * m for m in MEASURES))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gain", [20.0, 15.4165])
 def test_derivatives_of_the_objective(gain):
     """Also where the error passes through zero and the sharp cost has its kink."""

@@ -30,6 +30,7 @@ def sharp_overshoot(cycle):
     return float(overshoot(run.times, run.channel("position"), cycle.target, start=cycle.move.start_position))
 
 
+@pytest.mark.slow
 def test_design_under_limits_keeps_the_sharp_ones():
     limits = {"torque": 12.0, "voltage": 100.0, "overshoot": 0.02}
     assert sharp_overshoot(CYCLE) > 0.02
@@ -47,6 +48,7 @@ def test_design_under_limits_keeps_the_sharp_ones():
         assert sharp_peak(cycle, "torque") > 0.97 * 12.0
 
 
+@pytest.mark.slow
 def test_limits_lie_on_the_safe_side_of_the_sharp_measures():
     peak = sharp_peak(CYCLE, "torque")
     smooth = 1 - float(PeakLimit("torque", peak)(CYCLE))
@@ -78,6 +80,7 @@ def test_sensitivity_is_that_of_the_opened_loop():
     assert names == ["peak current", "sensitivity peak, moving", "sensitivity peak, rest", "energy", "time"]
 
 
+@pytest.mark.slow
 def test_derivatives_of_the_limits():
     limits = cycle_constraints(torque=12.0, overshoot=0.02, error=1e-3)
     start = GAINS.pack(CYCLE)

@@ -33,6 +33,7 @@ def miss(loop):
     return (loop.gain * loop.plant - 1) ** 2
 
 
+@pytest.mark.slow
 def test_variants_are_all_combinations():
     assert SPREAD.factors.tolist() == [[0.9, 0.5], [0.9, 1.0], [1.2, 0.5], [1.2, 1.0]]
     costs = np.asarray(RobustObjective(OBJECTIVE, SPREAD).costs(CYCLE))
@@ -45,6 +46,7 @@ def test_variants_are_all_combinations():
     assert np.max(costs) <= worst <= np.max(costs) + 1e-3 * np.log(4)
 
 
+@pytest.mark.slow
 def test_robust_design_is_better_in_the_worst_case():
     robust = RobustObjective(OBJECTIVE, SPREAD, worst_case=0.01)
     nominal = design(CYCLE, OBJECTIVE, ONE)
@@ -79,6 +81,7 @@ def test_no_spread_has_a_derivative_all_the_same():
     assert np.isfinite(slope)
 
 
+@pytest.mark.slow
 def test_trade_off_between_time_and_error():
     table = trade_off(CYCLE, OBJECTIVE, ONE, limits={"time": [0.21, 0.2, 0.19, 0.18]})
     assert (table["status"] == "converged").all()

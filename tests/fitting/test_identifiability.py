@@ -70,6 +70,7 @@ def test_a_prior_identifies_what_the_data_do_not():
     assert identifiability(fitted(planted, [2.0, 1.5, 1.0, 0.4, 0.6, 1.0], space, start=1.0)).groups == ()
 
 
+@pytest.mark.slow
 def test_the_experiment_that_would_help_is_found():
     """A line known near x = 0 only: measuring far away tells the slope, measuring there again does not."""
     result = fitted(line, [1.0, 2.0], box(2, -10.0, 10.0), x=np.linspace(0, 0.1, 20), deviation=0.1)

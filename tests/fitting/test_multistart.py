@@ -150,6 +150,7 @@ def test_bounds_that_are_not_finite_are_named():
         sample_starts(space, 4)
 
 
+@pytest.mark.slow
 def test_both_solvers_find_the_same_minimum(result):
     other = multistart(evidence(), MODEL, SPACE, starts=starts(150)[:16], solver=SLSQP(), max_steps=300)
     assert other.best.cost == pytest.approx(result.best.cost, rel=1e-8)

@@ -119,6 +119,7 @@ def _runs(fits):
     return [(k, certified, start) for k, certified in enumerate(fits.values()) for start in certified.starts]
 
 
+@pytest.mark.slow
 def test_all_in_one_batch(fits, batch):
     digits, success = batch([_lane(k, start) for k, _, start in _runs(fits)])
     assert np.sum((digits >= 6) & success) == 38

@@ -110,6 +110,7 @@ def test_no_step_to_where_the_cost_is_not_a_number():
     assert np.all(np.isfinite(result.history))
 
 
+@pytest.mark.slow
 def test_failures_are_told():
     start = design(at(2, 2), cliff, SPACE)
     assert start.stop == "not_finite"

@@ -95,6 +95,7 @@ def test_known_variance_is_a_normal_posterior(known, line):
 BOUNDED = ParameterSpace([Parameter("a", "m", 2.9), Parameter("b", "", -1.0, 0.5, prior=(0.1, 0.4))])
 
 
+@pytest.mark.slow
 def test_unknown_variance_is_students_t():
     """With 8 data and 2 parameters the tails have 6 degrees of freedom; bounds and prior are too far to matter."""
     residual = curved(1e4 * np.asarray(LINE.rows), 1e4 * (np.asarray(LINE.rows) @ [5.0, 0.1, 0.0]) + 5 * X * (X - 1.4))

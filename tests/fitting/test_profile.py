@@ -14,6 +14,7 @@ from twin._checks import InputError
 from twin.parameters import Parameter, ParameterSpace
 
 
+@pytest.mark.slow
 def test_a_line_has_the_profile_that_linear_theory_says():
     evidence = noisy(line, [1.0, 2.0], np.linspace(0, 1, 30), 0.1)
     result = fit(evidence, Coefficients(jnp.asarray([0.0, 0.0])), box(2, -100.0, 100.0))
@@ -37,6 +38,7 @@ def square(b, x):
     return b[0] ** 2 + 0 * x
 
 
+@pytest.mark.slow
 def test_a_parameter_that_enters_as_its_square_has_the_interval_of_the_square():
     """Likelihood intervals are invariant: those of b² are the squares of those of b, whatever linear theory says."""
     evidence = CurveResidual(square, np.zeros(8), np.full(8, 0.05) + 0.3 * np.sin(np.arange(8.0)), np.asarray(0.3))
@@ -52,6 +54,7 @@ def test_a_parameter_that_enters_as_its_square_has_the_interval_of_the_square():
     assert result.intervals()[0][0] < 0  # what linear theory says
 
 
+@pytest.mark.slow
 def test_what_the_data_leave_open_is_said_to_be_open():
     """Far below saturation only the ratio of the two parameters is known: no upper limit on either."""
     x = np.linspace(0.001, 0.02, 20)
@@ -97,6 +100,7 @@ def test_intervals_hold_the_truth_where_those_of_linear_theory_do_not():
     assert linear / repeats < 0.88
 
 
+@pytest.mark.slow
 def test_a_profile_of_a_robust_fit_agrees_with_its_standard_errors():
     """A straight line with gross outliers: the profile is that of the sandwich covariance, not of the inflated cost."""
     plain = noisy(line, [1.0, 2.0], np.linspace(0, 1, 60), 0.1)

@@ -145,6 +145,7 @@ START = Level(jnp.asarray(1.0))
 SPACE = ParameterSpace([Parameter("value")])
 
 
+@pytest.mark.slow
 def test_outliers_do_not_decide_a_robust_fit():
     """Every loss fits its own number to the same samples, all in one fit."""
     names = [type(loss).__name__ for loss in LOSSES]

@@ -170,6 +170,7 @@ def test_friction_with_memory_has_no_slope():
         axis.second_order(friction_speed=0.0)
 
 
+@pytest.mark.slow
 def test_nut_that_leaves_the_screw_marks_the_run():
     axis = mauro_axis()
     start = axis.initial_state()._replace(

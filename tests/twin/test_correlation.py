@@ -67,6 +67,7 @@ def test_loops_in_numpy(kind, kind_ref):
             assert np.isclose(paired[i, j], expected, rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_single_shapes_drop_their_axis():
     one, other, s, s_ref = shapes(2, "complex", 4), shapes(3, "real", 3), poles(2, 4), poles(3, 3)
     full, full_x = mac(one, other), macxp(one, s, other, s_ref)

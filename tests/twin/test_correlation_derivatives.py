@@ -49,6 +49,7 @@ def crossing(x):
     return SecondOrder(np.eye(N), 2.0 * np.eye(N), 0.03 * stiffness, stiffness, np.eye(N), np.eye(N), NAMES, NAMES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ground", [1.0, 0.0])
 @pytest.mark.parametrize("find", [modes, damped_modes])
 def test_distinct_and_rigid_body_modes(find, ground):
@@ -89,6 +90,7 @@ def test_distinct_and_rigid_body_modes(find, ground):
         assert np.isfinite(jax.jit(whole)(at))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", [-2e-2, -1e-5, 1e-5, 2e-2])
 def test_paired_modes_beside_and_across_a_crossing(at):
     """A hundred-thousandth from the crossing the differences reach across it, and only pairing keeps them smooth."""
@@ -104,6 +106,7 @@ def test_paired_modes_beside_and_across_a_crossing(at):
     assert_same(jax.jit(jax.jacfwd(compared))(at), difference(compared, at, 3e-4))
 
 
+@pytest.mark.slow
 def test_at_the_crossing_itself():
     """What does not depend on the choice of shapes in the pair's subspace is exact, all the rest finite."""
     reference = modes(crossing(0.05))
@@ -124,6 +127,7 @@ def test_at_the_crossing_itself():
     assert np.all(np.isfinite(slopes))
 
 
+@pytest.mark.slow
 def test_where_mac_is_one_or_zero():
     """cos² of the angle: slope 0, curvature -2 and 2, times what the eigenvalues make of it."""
     axis, s = jnp.array([1.0, 0.0]), jnp.asarray(-1.0 + 30j)
@@ -164,6 +168,7 @@ def test_by_eigenvalue():
         assert_same(jax.grad(value)(at), difference(value, at, 1e-4), 1e-8)
 
 
+@pytest.mark.slow
 def test_frequency_response_with_hysteretic_damping():
     """Receptance, FRAC and CSF at and between resonances, with one line on each resonance."""
     lines = jnp.sort(jnp.concatenate([modes(chain(0.0)).frequency, jnp.linspace(1.0, 40.0, 20)]))

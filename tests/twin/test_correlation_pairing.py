@@ -101,6 +101,7 @@ def test_rigid_body_modes_are_marked_and_leave_derivatives_alone():
         assert np.all(slope[1:] < 0)
 
 
+@pytest.mark.slow
 def test_unstable_and_absent_modes_are_marked():
     found = modes(chain(np.array([1.0, 1.2, -0.1, 1.6, 2.0])))
     assert np.isnan(found.frequency[0])
@@ -115,6 +116,7 @@ def test_unstable_and_absent_modes_are_marked():
     assert np.array_equal(jax.vmap(absent)(batch), [[0, 1, 2, 3, 4, 5], [0, 1, -1, 3, 4, 5]])
 
 
+@pytest.mark.slow
 def test_complex_modes_with_their_own_damping():
     system = chain()
     system = SecondOrder(

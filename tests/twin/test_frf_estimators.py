@@ -51,6 +51,7 @@ def smallest_eigenvector_response(sxx, syy, sxy):
     return -np.conj(vectors[:, 0, 0] / vectors[:, 1, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_estimators_are_those_of_scipys_spectra(settings):
     record = noisy_record()

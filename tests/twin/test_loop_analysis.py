@@ -141,6 +141,7 @@ def test_far_below_the_first_mode_the_elastic_axis_is_the_rigid_one():
     assert complex(found[0]) == pytest.approx(1 - S[0] * (1 - KFF) / KV, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_the_gain_margin_of_the_position_loop_is_where_it_becomes_unstable():
     f = np.linspace(40.0, 110.0, 701)
     opened = open_loop_response(ELASTIC, f, at="motor_angle", friction_speed=SPEED)

@@ -84,6 +84,7 @@ def test_one_mass():
     assert np.isclose(np.abs(slow.shapes[0, 0]), 1.0)
 
 
+@pytest.mark.slow
 def test_derivatives():
     """In both modes, against differences, first and second order, with the rigid body's defective pole beside."""
 

@@ -75,6 +75,7 @@ def test_step_is_that_of_the_linear_system(lead, feedback):
         assert float(found.states.controller.integral[k]) == pytest.approx(exact[3], rel=1e-4, abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kff", [0.0, 0.6, 1.0])
 def test_following_error_of_a_ramp(kff):
     """A PI velocity controller leaves no velocity error: the position lags by (1 - k_FF)·v/k_v."""
@@ -107,6 +108,7 @@ def test_command_is_the_formula_and_without_a_limit_exactly_so():
     assert 299.9 < float(limited) <= 300.0
 
 
+@pytest.mark.slow
 def test_anti_windup_keeps_the_integral_from_running_away():
     times = np.linspace(0.0, 0.8, 1601)
     peaks = []
@@ -118,6 +120,7 @@ def test_anti_windup_keeps_the_integral_from_running_away():
     assert float(found.outputs.position[-1]) == pytest.approx(0.05, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("voltage_limit", [float("inf"), 80.0])
 @pytest.mark.parametrize("anti_windup", [False, True])
 def test_derivatives(voltage_limit, anti_windup):
@@ -140,6 +143,7 @@ def test_derivatives(voltage_limit, anti_windup):
     assert np.any(exact[:, 5] != 0) == np.isfinite(voltage_limit)
 
 
+@pytest.mark.slow
 def test_derivatives_at_awkward_points():
     """No error, exactly at the limit, far beyond it, all gains zero."""
     t, state = jnp.zeros(()), control().initial_state()
@@ -184,6 +188,7 @@ def test_bad_input_is_named(fields, message):
         control(**fields)
 
 
+@pytest.mark.slow
 def test_a_bad_sample_of_a_batch_is_marked():
     def last(p):
         found = run(control(velocity_gain=p, anti_windup=True, voltage_limit=100.0), step(1e-3), TIMES[:21])

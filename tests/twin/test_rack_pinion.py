@@ -100,6 +100,7 @@ def _parts(p):
     return jnp.stack([g.real, g.imag])
 
 
+@pytest.mark.slow
 def test_derivatives_of_the_table_response_agree_with_differences():
     p = np.array([1.8709e7, 5.6406, 9.5376e5, 148.3813, 2.0734e4, 40e-6, 403.8])
     exact = jax.jit(jax.jacfwd(_parts))(p)
@@ -137,6 +138,7 @@ def test_the_mirrored_input_gives_the_mirrored_motion():
         np.testing.assert_allclose(a, -b, rtol=0, atol=1e-10 * np.max(np.abs(a)))
 
 
+@pytest.mark.slow
 def test_the_table_alone_follows_the_motors_as_it_did_in_the_drive():
     """Up to what the motors' motion loses by being taken as straight between its samples."""
     drive = DRIVES["tangent"]

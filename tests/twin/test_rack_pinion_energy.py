@@ -4,6 +4,7 @@ import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -104,6 +105,7 @@ _velocity = st.floats(-0.03, 0.03)
 BENCH = (1.8709e7, 5.6406, 9.5376e5, 148.3813, 2.0734e4, 40e-6, 7.5e-3, 403.8)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(_parameters, st.tuples(_unit, _unit), st.tuples(_velocity, _velocity, _velocity))
 @example(BENCH, (0.0, 0.0), (0.03, -0.03, 0.0))

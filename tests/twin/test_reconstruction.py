@@ -51,6 +51,7 @@ def test_the_weights_add_up_to_one_and_pass_smoothly():
     assert np.all(np.asarray(slopes) >= 0)
 
 
+@pytest.mark.slow
 def test_through_a_loss_of_contact_derivatives_are_finite():
     """Motor 1 lets go and takes the other flank while motor 2 holds; the force passes exactly through zero."""
     way = jnp.linspace(-1.0, 1.0, 41)

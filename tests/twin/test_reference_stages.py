@@ -66,6 +66,7 @@ def _positions(p):
     return jnp.stack([result.states.plant.position, result.states.plant.velocity])
 
 
+@pytest.mark.slow
 def test_derivatives_with_respect_to_the_reference_are_exact():
     """Limits, start times and distance of two moves after each other, and a gain; by a method whose last stage is not
     the next one's first."""

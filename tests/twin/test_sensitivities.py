@@ -210,6 +210,7 @@ def test_trap_4_constant_steps_see_a_moving_switching_time(positioning):
     assert _error(forward, expected, arrays, states, 1.0) < 1e-3
 
 
+@pytest.mark.slow
 def test_trap_3_reverse_mode_through_adaptive_steps(positioning):
     """What was "jvp to a custom_vjp function" in one direction and no `grad` in the other."""
     arrays, fixed, _, expected = positioning
@@ -250,6 +251,7 @@ def test_derivative_by_the_initial_state_is_the_transition_matrix(stepping):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stepping", [AdaptiveSteps(rtol=1e-9), ConstantSteps(4)], ids=["adaptive", "constant"])
 def test_a_jacobian_under_vmap_equals_those_one_by_one(stepping):
     """A batch of models, each with its own Jacobian: v = F/F_v·(1 - exp(-F_v·t/M))."""
@@ -274,6 +276,7 @@ def test_a_jacobian_under_vmap_equals_those_one_by_one(stepping):
     np.testing.assert_allclose(together, alone, rtol=1e-7, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_derivatives_of_a_sampled_loop_forward_and_reverse():
     """More ticks than one chunk of the recursion, and not a multiple of it."""
     loop = SampledLoop(LOOP.plant, SampledPositionVelocity(40.0, 80.0, command_limit=4.0), 1e-3, command_limit=9.0)

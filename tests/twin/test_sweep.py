@@ -174,7 +174,7 @@ def test_line():
     assert plot_sweep(found, "damping", ax=given) is given
     panels = plot_sweep_panels(found)
     assert [panel.get_ylabel() for panel in panels] == ["resonance [Hz]", "damping"]
-    with pytest.raises(InputError, match="1 axes for 2"):
+    with pytest.raises(InputError, match="1 axes, but 2"):
         plot_sweep_panels(found, axes=[given])
 
 

@@ -17,6 +17,7 @@ def decay(y, data):
     return y[0] * jnp.exp(-y[1] * jnp.asarray(X)) + y[2] - data
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("upper", [10.0, 1.0], ids=["free", "on a bound"])
 def test_fit_with_respect_to_its_data(upper):
     def estimate(data):
@@ -44,6 +45,7 @@ def inside_circle(y, target):
     return 1 - target * jnp.sum(y**2)[None]
 
 
+@pytest.mark.slow
 def test_minimum_under_a_constraint_that_moves():
     """The nearest point of the circle of radius 1/√a to (a, 2a) is (1, 2)/√(5a)."""
 

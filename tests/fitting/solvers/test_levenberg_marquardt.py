@@ -270,6 +270,7 @@ def _batch(start):
     return optx.least_squares(_rosenbrock, SOLVER, start, options=options, max_steps=200, throw=False)
 
 
+@pytest.mark.slow
 def test_a_bad_lane_is_marked_and_harms_no_other():
     random = np.random.default_rng(0)
     starts = random.uniform(-10, 10, (8, 2))

@@ -104,6 +104,7 @@ def test_a_mirrored_amplitude_mirrors_the_motion():
         np.testing.assert_array_equal(one, -other)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("band", [(0.2, 30.0), (30.0, 0.2), (5.0, 5.0)])
 def test_derivatives_with_respect_to_every_parameter(kind, band):

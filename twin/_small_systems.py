@@ -31,18 +31,6 @@ def solve_many(
     return _solve(matrices, right)
 
 
-def inverse_small(matrices: Inexact[Array, "n n systems"]) -> Inexact[Array, "n n systems"]:
-    """Inverses of many small matrices, whatever their size, without LAPACK: for callers that run in several threads.
-
-    Args:
-        matrices: A.
-
-    Returns:
-        A⁻¹; not finite, or huge by rounding, where A is singular.
-    """
-    return _inverse(matrices)
-
-
 @jax.custom_jvp
 def _solve(matrices: Array, right: Array) -> Array:
     return _product(_inverse(matrices), right)

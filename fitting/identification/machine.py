@@ -6,11 +6,13 @@ from typing import NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from fitting.fit import fit
 from fitting.identifiability import IdentifiabilityReport, identifiability
 from fitting.identification.force_balance import ForceBalance, force_balance
-from fitting.identification.machine_data import evidence, nuisance_space, stiffness_space
+from fitting.identification.machine_measurement import modal_evidence
+from fitting.identification.machine_unknowns import nuisance_space, stiffness_space
 from fitting.residuals.modes import ModesResidual
 from fitting.residuals.prior import GaussianPrior
 from fitting.residuals.residual import JointResidual
@@ -44,8 +46,8 @@ class MachineIdentification(NamedTuple):
 
     machine: Machine
     """The machine with the identified parameters."""
-    start: ForceBalance
-    """Stiffnesses by balance of forces, from which the joint fit started."""
+    start: ForceBalance | None
+    """Stiffnesses by balance of forces, from which the joint fit started; None if it was given another start."""
     fit: FitResult
     """Joint fit of all parameters to frequencies, shapes and damping ratios."""
     unpaired: tuple[UnpairedMode, ...]
@@ -97,9 +99,12 @@ def identify_machine(
             of a joint where one must be, whatever `fit` refuses.
     """
     above_zero("uncertainty", uncertainty, "-")
-    data = evidence(machine, references, positions) if residual is None else residual
-    balanced = force_balance(machine, references, positions, stiffness_space(space))
-    model = balanced.machine if start is None else start
+    data = modal_evidence(machine, references, positions) if residual is None else residual
+    if start is None:
+        balanced = force_balance(machine, references, positions, stiffness_space(space))
+        model = balanced.machine
+    else:
+        balanced, model = None, start
     searched, prior = space, ()
     if uncertain:
         others = nuisance_space(uncertain)
@@ -107,40 +112,33 @@ def identify_machine(
         searched = ParameterSpace([*space.parameters, *others.parameters])
         prior = (GaussianPrior(believed, uncertainty * np.abs(believed), others.paths),)
 
-    def fitted(model: Machine, data: ModesResidual) -> FitResult:
-        everything = JointResidual((data, *prior), ("modes", "belief")[: 1 + len(prior)])
-        return fit(everything, model, searched, max_steps=max_steps, variance="known")
+    def fitted(model: Machine, weight: np.ndarray) -> tuple[FitResult, np.ndarray]:
+        weighted = eqx.tree_at(lambda d: d.weight, data, jnp.asarray(weight))
+        everything = JointResidual((weighted, *prior), ("modes", "belief")[: 1 + len(prior)])
+        result = fit(everything, model, searched, max_steps=max_steps, variance="known")
+        return result, np.asarray(_likeness(data, result.model))
 
-    weight, measured = _believed(data, model, np.asarray(data.weight)), np.asarray(data.weight)
-    result = fitted(model, _weighted(data, weight))
+    measured = np.asarray(data.weight)
+    weight = _believed(np.asarray(_likeness(data, model)), measured)
+    result, likeness = fitted(model, weight)
     for _ in range(_ROUNDS):
-        again = _believed(data, result.model, measured)
+        again = _believed(likeness, measured)
         if np.array_equal(again, weight):
             break
         weight = again
-        result = fitted(result.model, _weighted(data, weight))
-    return MachineIdentification(result.model, balanced, result, _unpaired(data, result.model, measured, weight))
-
-
-def _believed(data: ModesResidual, model: Machine, measured: np.ndarray) -> np.ndarray:
-    """Weights of the measured modes: 1 for those that a mode of the model is like."""
-    return np.where(np.asarray(_pairs(data, model)) >= _LIKE, measured, 0.0)
-
-
-def _weighted(data: ModesResidual, weight: np.ndarray) -> ModesResidual:
-    return eqx.tree_at(lambda d: d.weight, data, jnp.asarray(weight))
-
-
-@eqx.filter_jit
-def _pairs(data: ModesResidual, model: Machine) -> jnp.ndarray:
-    return data.pairs(model).value
-
-
-def _unpaired(
-    data: ModesResidual, model: Machine, measured: np.ndarray, weight: np.ndarray
-) -> tuple[UnpairedMode, ...]:
-    likeness = np.asarray(_pairs(data, model))
-    return tuple(
+        result, likeness = fitted(result.model, weight)
+    unpaired = tuple(
         UnpairedMode(float(data.position[i]), int(j), float(data.frequency[i, j]), float(likeness[i, j]))
         for i, j in np.argwhere((measured > 0) & (weight == 0))
     )
+    return MachineIdentification(result.model, balanced, result, unpaired)
+
+
+def _believed(likeness: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """Weights of the measured modes: 1 for those that a mode of the model is like."""
+    return np.where(likeness >= _LIKE, measured, 0.0)
+
+
+@eqx.filter_jit
+def _likeness(data: ModesResidual, model: Machine) -> Array:
+    return data.pairs(model).value

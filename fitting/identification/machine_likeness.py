@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Int
 
 from fitting.identification.machine_macxp import macxp_of_one_ratio
 from fitting.residuals.residual import AbstractResidual
-from twin.modal.updated import Shifted, updated_mode
+from twin.modal.updated import beside_mode, updated_mode
 
 # Distance from the eigenvalue at which the adjoint is solved, as a share of it; one round takes it out again.
 _SHIFT = 1e-7
@@ -84,21 +84,12 @@ def unlikeness(share: Float[Array, "parameters"], data: PartData) -> tuple[Array
     (per_mac, per_value) = jax.grad(likeness, argnums=(0, 1))(mac, value)
     # ∂MAC/∂φ is orthogonal to φ, for MAC does not depend on its length.
     right = per_mac * 2 * along / length * (data.cross - along / length * moved)
-    beside = Shifted.of(data.eigenvalues, data.vectors, change, value * (1 - _SHIFT))
-    adjoint = jnp.zeros_like(shape)
-    for _ in range(2):
-        left = right - _times(data, change, adjoint) + value * adjoint
-        adjoint = adjoint + beside.solve(left - shape * (shape @ left))
-        adjoint = adjoint - shape * (shape @ adjoint)
+    adjoint = beside_mode(data.eigenvalues, data.vectors, change, value, shape, right, shift=_SHIFT, rounds=2)
     stretch = shape @ data.vectors
     per_row = (per_value * stretch - adjoint @ data.vectors) * stretch * data.weight
     slope = jnp.sum(jnp.where(data.owner[:, None] == jnp.arange(share.size), per_row[:, None], 0.0), axis=0)
     # What is no mode has no likeness: the solver then takes a shorter step.
     return jnp.where(mode.error < _ERROR, 1 - likeness(mac, value), jnp.nan), -slope
-
-
-def _times(data: PartData, change: Array, shape: Array) -> Array:
-    return data.eigenvalues * shape + data.vectors @ (change * (shape @ data.vectors))
 
 
 def _root(value: Array) -> Array:

@@ -1,17 +1,15 @@
 """All runs of the small problems of a machine, each checked against all of its modes."""
 
 import dataclasses
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from fitting.blas_threads import one_blas_thread
 from fitting.identification.machine_affine import AffineMachine
 from fitting.identification.machine_evidence import Evidence
+from fitting.shared_out import shared_out
 from fitting.solvers.stop import CONVERGED
 from twin.parameters import ParameterSpace
 
@@ -128,5 +126,4 @@ def best_macxp(
             found[usable] = alike[..., 0].max(axis=1)
         return found
 
-    with one_blas_thread(), ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
-        return np.stack(list(pool.map(one, range(len(problems)))))
+    return np.stack(shared_out(one, range(len(problems)), threads))

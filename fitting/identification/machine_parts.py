@@ -3,21 +3,19 @@
 Source: section 2.3.2 of J. Ellinger, M. F. Zaeh, Machines 10 (2022) 535.
 """
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool
 
-from fitting.blas_threads import one_blas_thread
 from fitting.identification.machine_affine import AffineMachine, affine_machine
 from fitting.identification.machine_evidence import Evidence, evidence
 from fitting.identification.machine_likeness import PartData, Shares, Unlikeness
 from fitting.identification.machine_part_runs import PartRuns, best_macxp
 from fitting.lanes import Task, solve_lanes
 from fitting.objective import Objective
+from fitting.shared_out import shared_out
 from fitting.solvers.slsqp import SLSQP
 from twin._checks import InputError
 from twin.modal.reference import ReferenceModes
@@ -93,8 +91,7 @@ def solve_parts(
             continue
         rows = max(int(mask[i][owner[i][0].spring_of].sum()) for i in chosen)
         tasks = [(*owner[i], mask[i], values[i], bounds, rows) for i in chosen]
-        with one_blas_thread(), ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
-            made = list(pool.map(_prepared, tasks))
+        made = shared_out(_prepared, tasks, threads)
         common = PartData(*(jnp.asarray(leaf[0]) for leaf in made[0]))
         stacked = tuple(np.concatenate(leaves) for leaves in zip(*made, strict=True))
         first = np.concatenate([_padded(drawn[i][:, mask[i]], size) for i in chosen])

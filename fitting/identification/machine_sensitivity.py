@@ -6,18 +6,16 @@ they add to the damping ratios is linear in them.
 
 import dataclasses
 import functools
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from fitting.blas_threads import one_blas_thread
 from fitting.identification.machine_affine import AffineMachine, affine_machine
 from fitting.identification.machine_evidence import Evidence, evidence
+from fitting.shared_out import shared_out
 from sensitivity import SobolIndices, SobolSamples, sobol_indices, sobol_samples
 from twin._checks import InputError
 from twin.correlation import assign
@@ -142,8 +140,7 @@ def mode_outputs(
     tasks = [
         (part, one, stiffness[i : i + _CHUNK], threshold) for part, one in zip(parts, data, strict=True) for i in starts
     ]
-    with one_blas_thread(), ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
-        done = list(pool.map(_solved, tasks))
+    done = shared_out(_solved, tasks, threads)
     shape, damping, missing = [], [], []
     for number, one in enumerate(data):
         own = done[number * len(starts) : (number + 1) * len(starts)]

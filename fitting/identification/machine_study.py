@@ -9,8 +9,8 @@ import numpy as np
 
 from fitting.identification.conformity import ConformityStatistics, conformity
 from fitting.identification.machine import MachineIdentification, identify_machine
-from fitting.identification.machine_data import measured_modes, noisy, nuisance_space, translations
-from fitting.identification.machine_unknowns import unknown_space
+from fitting.identification.machine_measurement import measured_modes, noisy, translations
+from fitting.identification.machine_unknowns import nuisance_space, unknown_space
 from twin.frf import FRF
 from twin.linear import frequency_response
 from twin.parameters import ParameterSpace

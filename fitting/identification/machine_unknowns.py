@@ -1,5 +1,6 @@
 """The unknown springs and dampers of a machine, and the intervals that they are searched in."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -9,7 +10,7 @@ from twin._checks import InputError
 from twin.parameters import Parameter, ParameterSpace
 from twin.paths import get_leaf
 from twin.structure import Machine
-from twin.structure.reference_quantities import UNKNOWN
+from twin.structure.reference_quantities import UNKNOWN, Quantity
 
 STIFFNESS, VISCOUS, HYSTERETIC = "stiffness", "viscous", "hysteretic"
 STIFFNESS_INTERVAL, DAMPING_INTERVAL = (0.7, 1.3), (1 / 3, 3.0)
@@ -54,6 +55,24 @@ def unknown_space(machine: Machine, *, scale: str = "linear") -> ParameterSpace:
         value = float(get_leaf(machine, quantity.path))
         parameters.append(Parameter(quantity.path, quantity.unit, low * value, high * value, scale=scale))
     return ParameterSpace(parameters)
+
+
+def stiffness_space(space: ParameterSpace) -> ParameterSpace:
+    """The stiffnesses of a space, by their paths.
+
+    Args:
+        space: of a machine's joints.
+    """
+    return space.subset([path for path in space.paths if ".stiffness." in path])
+
+
+def nuisance_space(quantities: Sequence[Quantity]) -> ParameterSpace:
+    """Quantities that are not searched but not exactly known either: free without bounds, as a prior holds them.
+
+    Args:
+        quantities: which.
+    """
+    return ParameterSpace([Parameter(quantity.path, quantity.unit) for quantity in quantities])
 
 
 def unknowns(space: ParameterSpace) -> Unknowns:

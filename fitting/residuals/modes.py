@@ -122,7 +122,7 @@ class ModesResidual(AbstractResidual):
 
     def __call__(self, model: Machine) -> Float[Array, "residuals"]:
         found = self.modes(model)
-        return jax.vmap(self._compared)(found, *self._reference(), self.weight).ravel()
+        return jax.vmap(self._compared)(found, self.frequency, self.damping_ratio, self.shapes, self.weight).ravel()
 
     def modes(self, model: Machine) -> Modes:
         """The machine's modes at all positions and at the outputs measured, one batch.
@@ -138,20 +138,17 @@ class ModesResidual(AbstractResidual):
         Args:
             model: the machine.
         """
-        return jax.vmap(self._paired)(self.modes(model), *self._reference(), self.weight)
+        return jax.vmap(self._paired)(self.modes(model), self.frequency, self.shapes, self.weight)
 
-    def _reference(self) -> tuple[Array, Array, Array]:
-        return self.frequency, self.damping_ratio, self.shapes
-
-    def _paired(self, found: Modes, frequency: Array, _: Array, shapes: Array, weight: Array) -> PairedModes:
-        wide, wide_ref = (eigenvalue_of(f, _WIDE) for f in (found.frequency, frequency))
+    def _paired(self, found: Modes, frequency: Array, shapes: Array, weight: Array) -> PairedModes:
+        wide, wide_ref = (eigenvalue(f, _WIDE) for f in (found.frequency, frequency))
         alike = marked_macxp(found.output_shapes, wide[:, None], shapes, wide_ref[None, :])
         # Without a threshold: far from the reference a bad pair is what there is to improve. What does not count comes
         # last, so that it takes no mode away.
         return assign(jax.lax.stop_gradient(alike * jnp.where(weight > 0, 1.0, 1e-9)), threshold=0.0)
 
     def _compared(self, found: Modes, frequency: Array, ratio: Array, shapes: Array, weight: Array) -> Array:
-        order = self._paired(found, frequency, ratio, shapes, weight).order
+        order = self._paired(found, frequency, shapes, weight).order
         own = found.output_shapes[:, order]
         sign = jax.lax.stop_gradient(jnp.where(jnp.sum(own * shapes, axis=0) < 0, -1.0, 1.0))
         parts = {
@@ -160,16 +157,6 @@ class ModesResidual(AbstractResidual):
             "damping": jnp.log(found.damping_ratio[order] / ratio) / self.damping_deviation,
         }
         return jnp.concatenate([(weight * parts[kind]).ravel() for kind in KINDS if kind in self.kinds])
-
-
-def eigenvalue_of(frequency: Float[Array, "..."], ratio: float) -> Array:
-    """λ of modes that are all given one damping ratio; traced frequencies pass.
-
-    Args:
-        frequency: f [Hz].
-        ratio: ζ [-].
-    """
-    return eigenvalue(frequency, jnp.full_like(frequency, ratio))
 
 
 def _padded(reference: ReferenceModes, most: int) -> tuple[Array, Array, Array, Array]:

@@ -14,8 +14,6 @@ from twin._small_systems import eliminated
 
 # Each step trebles the digits: from a shape some way off four are enough. At this error the eigenvalue is exact.
 _STEPS, _ERROR = 8, 1e-9
-# Distance from the eigenvalue at which derivatives are solved, as a share of it, and rounds that take it out again.
-_SHIFT, _ROUNDS = 1e-6, 2
 
 
 class UpdatedMode(eqx.Module):
@@ -69,10 +67,10 @@ def _picked(eigenvalues: Array, vectors: Array, change: Array, start: Array, nea
 
 @jax.custom_jvp
 def _eigenpair(eigenvalues: Array, vectors: Array, change: Array, start: Array) -> tuple[Array, Array]:
-    def value_and_error(shape: Array) -> tuple[Array, Array]:
+    def judged(shape: Array) -> tuple[Array, Array, Array]:
         moved = _times(eigenvalues, vectors, change, shape)
         value = shape @ moved
-        return value, jnp.linalg.norm(moved - value * shape) / jnp.abs(value)
+        return value, shape, jnp.linalg.norm(moved - value * shape) / jnp.abs(value)
 
     def step(carry: tuple) -> tuple:
         count, value, shape, _ = carry
@@ -80,14 +78,13 @@ def _eigenpair(eigenvalues: Array, vectors: Array, change: Array, start: Array) 
         solved = Shifted.of(eigenvalues, vectors, change, value * (1 + 1e-13) + 1e-300).solve(shape)
         usable = jnp.all(jnp.isfinite(solved)) & jnp.any(solved != 0)
         solved = jnp.where(usable, solved / jnp.linalg.norm(solved), shape)
-        return count + 1, *_after(solved, value_and_error(solved))
+        return count + 1, *judged(solved)
 
     def unfinished(carry: tuple) -> Array:
         count, _, _, error = carry
         return (count < _STEPS) & (error > _ERROR)
 
-    shape = start / jnp.linalg.norm(start)
-    begun = (jnp.asarray(0), *_after(shape, value_and_error(shape)))
+    begun = (jnp.asarray(0), *judged(start / jnp.linalg.norm(start)))
     _, value, found, _ = jax.lax.while_loop(unfinished, step, begun)
     return value, jnp.where(found @ start < 0, -found, found)
 
@@ -102,13 +99,42 @@ def _eigenpair_jvp(primals: tuple, tangents: tuple) -> tuple[tuple, tuple]:
     pushed = pushed + d_vectors @ (change * stretch) + vectors @ (change * (shape @ d_vectors))
     d_value = shape @ pushed
     right = d_value * shape - pushed
-    beside = Shifted.of(eigenvalues, vectors, change, value * (1 - _SHIFT))
-    turned = jnp.zeros_like(shape)
-    for _ in range(_ROUNDS + 1):
-        left = right - (_times(eigenvalues, vectors, change, turned) - value * turned)
-        turned = turned + beside.solve(left - shape * (shape @ left))
-        turned = turned - shape * (shape @ turned)
-    return (value, shape), (d_value, turned)
+    return (value, shape), (d_value, beside_mode(eigenvalues, vectors, change, value, shape, right))
+
+
+def beside_mode(
+    eigenvalues: Float[Array, "n"],
+    vectors: Float[Array, "n springs"],
+    change: Float[Array, "springs"],
+    value: Float[Array, ""],
+    shape: Float[Array, "n"],
+    right: Float[Array, "n"],
+    *,
+    shift: float = 1e-6,
+    rounds: int = 3,
+) -> Float[Array, "n"]:
+    """The solution x of (K - λI)·x = b that is orthogonal to a mode φ, b without its part along φ.
+
+    Derivatives and adjoints of the mode are of this kind. Solved at a small distance from the eigenvalue, which further
+    rounds take out again.
+
+    Args:
+        eigenvalues: λ₀ of the structure before the change [1/s²].
+        vectors: B.
+        change: Δk [N/m].
+        value: eigenvalue λ of the mode [1/s²], distinct from the others.
+        shape: unit vector φ.
+        right: b.
+        shift: distance from the eigenvalue, as a share of it [-].
+        rounds: solutions; the error falls by the distance over the gap to the next eigenvalue with each.
+    """
+    near = Shifted.of(eigenvalues, vectors, change, value * (1 - shift))
+    found = jnp.zeros_like(shape)
+    for _ in range(rounds):
+        left = right - (_times(eigenvalues, vectors, change, found) - value * found)
+        found = found + near.solve(left - shape * (shape @ left))
+        found = found - shape * (shape @ found)
+    return found
 
 
 class Shifted(eqx.Module):
@@ -156,8 +182,3 @@ class Shifted(eqx.Module):
 
 def _times(eigenvalues: Array, vectors: Array, change: Array, shape: Array) -> Array:
     return eigenvalues * shape + vectors @ (change * (shape @ vectors))
-
-
-def _after(shape: Array, found: tuple[Array, Array]) -> tuple[Array, Array, Array]:
-    value, error = found
-    return value, shape, error

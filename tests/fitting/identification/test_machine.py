@@ -6,7 +6,7 @@ import pytest
 
 from fitting.identification.force_balance import force_balance
 from fitting.identification.machine import identify_machine
-from fitting.identification.machine_data import measured_modes, noisy, stiffness_space
+from fitting.identification.machine_measurement import measured_modes, noisy
 from fitting.identification.machine_study import (
     DISTURBED,
     IDENTIFICATION,
@@ -17,7 +17,7 @@ from fitting.identification.machine_study import (
     permuted_damping,
     random_truth,
 )
-from fitting.identification.machine_unknowns import unknown_space
+from fitting.identification.machine_unknowns import stiffness_space, unknown_space
 from twin._checks import InputError
 from twin.modal import ReferenceModes
 from twin.parameters import Parameter, ParameterSpace

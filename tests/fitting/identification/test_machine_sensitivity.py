@@ -4,13 +4,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from machine_cases import FEW, PLACES, measured, nominal, outputs, small_study, space
+from threadpoolctl import threadpool_info
 
-from fitting.blas_threads import one_blas_thread
 from fitting.identification.machine_affine import affine_machine
 from fitting.identification.machine_evidence import evidence
 from fitting.identification.machine_macxp import macxp_of_one_ratio
 from fitting.identification.machine_sensitivity import machine_sensitivity, mode_outputs
 from fitting.identification.machine_unknowns import unknown_space, unknowns
+from fitting.shared_out import shared_out
 from sensitivity import sobol_samples
 from twin._checks import InputError
 from twin.correlation import eigenvalue, macxp, macxp_of_modes, ndd_squared, pair_modes
@@ -72,9 +73,14 @@ def test_bounds_are_those_of_equation_14():
     np.testing.assert_allclose(bounds[~stiff], [[1 / 3, 3.0]] * 11)
 
 
+def blas_threads(_=None):
+    return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
+
+
 def test_numpy_keeps_its_threads_afterwards():
-    with one_blas_thread():
-        np.linalg.eigh(np.eye(3))
+    before = blas_threads()
+    assert shared_out(blas_threads, range(2)) == [[1] * len(before)] * 2
+    assert blas_threads() == before
     np.testing.assert_allclose(np.linalg.eigh(np.diag([1.0, 2.0]))[0], [1, 2])
 
 

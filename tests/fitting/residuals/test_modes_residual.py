@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from fitting.identification.machine_data import measured_modes
+from fitting.identification.machine_measurement import measured_modes
 from fitting.identification.machine_unknowns import unknown_space
 from fitting.residuals.modes import ModesResidual
 from fitting.residuals.prior import GaussianPrior

@@ -1,4 +1,4 @@
-"""Modal data of a machine: what is measured where, with what noise, and what of the machine is not exactly known."""
+"""What modal analysis measures of a machine: outputs, modes with and without noise, and their weight as evidence."""
 
 from collections.abc import Sequence
 
@@ -9,28 +9,8 @@ import numpy as np
 from fitting.residuals.modes import ModesResidual
 from twin._checks import InputError
 from twin.modal import ReferenceModes, modes, reference_modes
-from twin.parameters import Parameter, ParameterSpace
 from twin.structure import Machine
 from twin.structure.reference_machine import MODES
-from twin.structure.reference_quantities import Quantity
-
-
-def stiffness_space(space: ParameterSpace) -> ParameterSpace:
-    """The stiffnesses of a space, by their paths.
-
-    Args:
-        space: of a machine's joints.
-    """
-    return space.subset([path for path in space.paths if ".stiffness." in path])
-
-
-def nuisance_space(quantities: Sequence[Quantity]) -> ParameterSpace:
-    """Quantities that are not searched but not exactly known either: free without bounds, as a prior holds them.
-
-    Args:
-        quantities: which.
-    """
-    return ParameterSpace([Parameter(quantity.path, quantity.unit) for quantity in quantities])
 
 
 def translations(machine: Machine) -> tuple[str, ...]:
@@ -95,7 +75,7 @@ def noisy(
     return tuple(one(reference) for reference in references)
 
 
-def evidence(machine: Machine, references: Sequence[ReferenceModes], positions: Sequence[float]) -> ModesResidual:
+def modal_evidence(machine: Machine, references: Sequence[ReferenceModes], positions: Sequence[float]) -> ModesResidual:
     """The modes of a machine as evidence, after a look at whether the machine can have them.
 
     Args:

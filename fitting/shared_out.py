@@ -1,0 +1,27 @@
+"""Small problems of NumPy's linear algebra, shared out whole among threads."""
+
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+from threadpoolctl import threadpool_limits
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+def shared_out(function: Callable[[Task], Result], tasks: Iterable[Task], threads: int | None = None) -> list[Result]:
+    """Results of a function for many tasks, in their order, several at a time.
+
+    NumPy's linear algebra uses one thread in the whole process meanwhile: its libraries split even a small eigenproblem
+    among all cores, and where these are busy the threads wait for each other. Seen were 18 ms instead of 0.4 ms for 62
+    unknowns.
+
+    Args:
+        function: what is done; most of its time must be spent in NumPy.
+        tasks: its arguments.
+        threads: tasks done side by side; the number of cores if not given.
+    """
+    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+        return list(pool.map(function, tasks))

@@ -50,6 +50,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(leipe, _leipe, "out/leipe")
     mauro = studies.add_parser("mauro", help="ball-screw axis: modes, Table 1 by a fitted twin, gains by gradients")
     _add_run(mauro, _mauro, "out/mauro")
+    ellinger = studies.add_parser("ellinger", help="whole machine: sensitivities, 6,000 small problems, joint fit")
+    _add_run(ellinger, _ellinger, "out/ellinger")
     return parser
 
 
@@ -100,3 +102,10 @@ def _mauro(out: Path) -> str:
     from fitting.identification.mauro_report import reproduce_mauro, tabulate
 
     return f"{tabulate(reproduce_mauro(out))}\nResults in {out}"
+
+
+def _ellinger(out: Path) -> str:
+    from fitting.identification.ellinger_report import reproduce_ellinger
+    from fitting.identification.ellinger_summary import text_of
+
+    return f"{text_of(reproduce_ellinger(out))}\nResults in {out}"

@@ -19,7 +19,13 @@ _CROWD = 0.1
 
 
 def plot_indices(
-    indices: SobolIndices, output: str | int, *, top: int = 10, threshold: float | None = None, ax: "Axes | None" = None
+    indices: SobolIndices,
+    output: str | int,
+    *,
+    top: int = 10,
+    threshold: float | None = None,
+    names: Mapping[str, str] | None = None,
+    ax: "Axes | None" = None,
 ) -> "Axes":
     """First-order and total indices of the most significant parameters as bars, intervals as whiskers.
 
@@ -30,6 +36,7 @@ def plot_indices(
         output: name or number of the output.
         top: most parameters drawn, by total effect.
         threshold: total effect from which a parameter matters, drawn as a line if given.
+        names: what to write instead of a parameter's path, by path.
         ax: axes to draw in; new ones if not given.
     """
     ax = axes_or_new(ax)
@@ -47,7 +54,7 @@ def plot_indices(
     if threshold is not None:
         ax.axhline(threshold, color="C3", lw=0.9, ls="--", label=f"threshold {threshold:g}")
     ax.axhline(0, color="0.15", lw=0.6)
-    ax.set_xticks(at, [indices.names[k] for k in order], rotation=40, ha="right", fontsize="small")
+    ax.set_xticks(at, [_written(indices.names[k], names) for k in order], rotation=40, ha="right", fontsize="small")
     ax.set_ylabel("Sobol index [-]")
     ax.set_title(f"{indices.outputs[row]}, {100 * indices.confidence:g} % intervals", fontsize="medium")
     ax.legend(fontsize="small", frameon=False)
@@ -60,6 +67,7 @@ def plot_heat_map(
     *,
     labels: Sequence[str] | None = None,
     threshold: float = 0.01,
+    names: Mapping[str, str] | None = None,
     ax: "Axes | None" = None,
 ) -> "Axes":
     """Total effect of every parameter on many outputs, as for each mode at each axis position.
@@ -71,6 +79,7 @@ def plot_heat_map(
         labels: what to write under the columns of each block, as many as the largest block has; by default their
             numbers within the block, from 1.
         threshold: total effect from which a parameter matters: what is not above stays white.
+        names: what to write instead of a parameter's path, by path.
         ax: axes to draw in; new ones if not given.
 
     Raises:
@@ -78,9 +87,9 @@ def plot_heat_map(
     """
     from matplotlib.colors import LogNorm
 
-    blocks = {"": indices.outputs} if columns is None else {title: tuple(names) for title, names in columns.items()}
-    drawn = [indices.index(name) for names in blocks.values() for name in names]
-    longest = max((len(names) for names in blocks.values()), default=0)
+    blocks = {"": indices.outputs} if columns is None else {title: tuple(block) for title, block in columns.items()}
+    drawn = [indices.index(name) for block in blocks.values() for name in block]
+    longest = max((len(block) for block in blocks.values()), default=0)
     if not longest:
         raise InputError("columns names no outputs. Give at least one block with one name.")
     under = [str(i + 1) for i in range(longest)] if labels is None else list(labels)
@@ -92,15 +101,16 @@ def plot_heat_map(
     shown = np.ma.masked_less_equal(shares, threshold)
     image = ax.imshow(shown, aspect="auto", cmap="viridis_r", norm=LogNorm(threshold, 1.0, clip=True))
     start, ticks = 0, []
-    for title, names in blocks.items():
-        ticks += under[: len(names)]
+    for title, block in blocks.items():
+        ticks += under[: len(block)]
         if title:
-            ax.text(start + len(names) / 2 - 0.5, -0.8, title, ha="center", va="bottom")
-        start += len(names)
+            ax.text(start + len(block) / 2 - 0.5, -0.8, title, ha="center", va="bottom")
+        start += len(block)
         if start < len(drawn):
             ax.axvline(start - 0.5, color="0.15", lw=1.0)
     ax.set_xticks(np.arange(len(drawn)), ticks, fontsize="x-small", rotation=90 if max(map(len, ticks)) > 2 else 0)
-    ax.set_yticks(np.arange(len(indices.names)), indices.names, fontsize="x-small")
+    rows = [_written(name, names) for name in indices.names]
+    ax.set_yticks(np.arange(len(rows)), rows, fontsize="x-small")
     ax.set_xticks(np.arange(len(drawn) + 1) - 0.5, minor=True)
     ax.set_yticks(np.arange(len(indices.names) + 1) - 0.5, minor=True)
     ax.grid(which="minor", color="0.9", lw=0.4)
@@ -178,6 +188,10 @@ def plot_effects(
     ax.set_title(effects.outputs[row], fontsize="medium")
     ax.legend(fontsize="small")
     return ax
+
+
+def _written(name: str, names: Mapping[str, str] | None) -> str:
+    return name if names is None else names.get(name, name)
 
 
 def _strongest(values: np.ndarray, top: int) -> np.ndarray:

@@ -7,7 +7,7 @@ Source: sections 3.2 and 3.3 of J. Ellinger, M. F. Zaeh, Machines 10 (2022) 535.
 """
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -163,12 +163,7 @@ def repeat_ideal(seeds: Sequence[int]) -> tuple[Repeat, ...]:
     Args:
         seeds: of the truths.
     """
-
-    def one(seed: int) -> Repeat:
-        found = identify_truth(seed)
-        return Repeat(seed, found, conformity_of(found.identification.machine, random_truth(seed), VALIDATION))
-
-    return tuple(shared_out(one, seeds, None))
+    return _repeated(identify_truth, seeds)
 
 
 def repeat_disturbed(seeds: Sequence[int], uncertain: Sequence[Quantity] = DISTURBED) -> tuple[Repeat, ...]:
@@ -178,9 +173,13 @@ def repeat_disturbed(seeds: Sequence[int], uncertain: Sequence[Quantity] = DISTU
         seeds: of the truths and disturbances.
         uncertain: what is let go.
     """
+    return _repeated(lambda seed: identify_truth(seed, model=disturbed_machine(seed), uncertain=uncertain), seeds)
 
+
+def _repeated(identify: Callable[[int], Deviation], seeds: Sequence[int]) -> tuple[Repeat, ...]:
     def one(seed: int) -> Repeat:
-        found = identify_truth(seed, model=disturbed_machine(seed), uncertain=uncertain)
+        found = identify(seed)
         return Repeat(seed, found, conformity_of(found.identification.machine, random_truth(seed), VALIDATION))
 
-    return tuple(shared_out(one, seeds, None))
+    # The first alone, as all others then find its programs compiled.
+    return (*(one(seed) for seed in seeds[:1]), *shared_out(one, seeds[1:]))

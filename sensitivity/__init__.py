@@ -1,6 +1,8 @@
 """Which parameters matter where: variance-based, screening and derivative-based sensitivity."""
 
 from sensitivity.derivative import derivative_measures as derivative_measures
+from sensitivity.derivative import derivative_samples as derivative_samples
+from sensitivity.derivative import measures_from_derivatives as measures_from_derivatives
 from sensitivity.derivative import screen as screen
 from sensitivity.derivative_result import DerivativeMeasures as DerivativeMeasures
 from sensitivity.evaluation import evaluate as evaluate

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -71,34 +72,98 @@ def derivative_measures(
     References:
         I. M. Sobol' and S. Kucherenko, Mathematics and Computers in Simulation 79 (2009) 3009-3017.
     """
+    if mode not in ("auto", "forward", "reverse"):
+        raise InputError(f'mode must be "auto", "forward" or "reverse", but is {mode!r}.')
+    require_interval(confidence, resamples)
+    values = derivative_samples(space, n, seed=seed)
+    found = evaluate(_WithSlopes(fn, space, model is not None, mode), space, values, model=model, chunk=chunk)
+    done = {name: array for (kind, name), array in found.items() if kind == "value"}
+    slopes = [array.reshape(n, -1, len(space)) for (kind, _), array in found.items() if kind == "slope"]
+    return measures_from_derivatives(
+        space,
+        values,
+        done.get(None, done),
+        np.concatenate(slopes, axis=1),
+        seed=seed,
+        outputs=outputs,
+        confidence=confidence,
+        resamples=resamples,
+    )
+
+
+def derivative_samples(space: ParameterSpace, n: int = 256, *, seed: int) -> np.ndarray:
+    """Points of a derivative-based study (n, parameters), SI: a scrambled Sobol sequence.
+
+    Args:
+        space: parameters with finite bounds; each is uniform between them on its own scale.
+        n: points, a power of two.
+        seed: seed of the scrambling, from 1.
+
+    Raises:
+        InputError: bounds missing, n not a power of two, no seed.
+    """
     require_bounds(space)
     require_seed(seed)
     require_power_of_two(n)
-    require_interval(confidence, resamples)
-    if mode not in ("auto", "forward", "reverse"):
-        raise InputError(f'mode must be "auto", "forward" or "reverse", but is {mode!r}.')
     from scipy.stats import qmc
 
-    unit = qmc.Sobol(d=len(space), scramble=True, rng=np.random.default_rng(seed)).random(n)
-    values = from_unit(space, unit)
-    found = evaluate(_WithSlopes(fn, space, model is not None, mode), space, values, model=model, chunk=chunk)
-    done = {name: array for (kind, name), array in found.items() if kind == "value"}
-    matrix, names = named_columns(done.get(None, done), outputs, n)
-    slopes = [array.reshape(n, -1, len(space)) for (kind, _), array in found.items() if kind == "slope"]
-    derivatives = np.concatenate(slopes, axis=1)
-    require_finite(matrix, names, space, values)
+    return from_unit(space, qmc.Sobol(d=len(space), scramble=True, rng=np.random.default_rng(seed)).random(n))
+
+
+def measures_from_derivatives(
+    space: ParameterSpace,
+    samples: Float[np.ndarray, "rows parameters"],
+    values: Any,
+    derivatives: Float[np.ndarray, "rows outputs parameters"],
+    *,
+    seed: int,
+    outputs: Sequence[str] | None = None,
+    confidence: float = 0.95,
+    resamples: int = 100,
+) -> DerivativeMeasures:
+    """Measures and bounds as `derivative_measures`, from outputs and exact derivatives that were found elsewhere.
+
+    Args:
+        space: the parameters.
+        samples: points, SI, as of `derivative_samples`.
+        values: outputs there: (rows,), (rows, outputs), or a dict of such.
+        derivatives: derivatives of the outputs with respect to the parameters in SI.
+        seed: seed of the intervals, from 1.
+        outputs: names of the outputs, in order.
+        confidence: probability that the intervals are made for.
+        resamples: bootstrap samples that the intervals come from.
+
+    Returns:
+        Measures and bounds.
+
+    Raises:
+        InputError: bounds missing, another number of rows, outputs or parameters, what is not finite.
+    """
+    require_bounds(space)
+    require_seed(seed)
+    require_interval(confidence, resamples)
+    rows = len(samples)
+    matrix, names = named_columns(values, outputs, rows)
+    if derivatives.shape != (rows, len(names), len(space)):
+        raise InputError(
+            f"derivatives has the shape {derivatives.shape}, but there are {rows} samples, {len(names)} outputs and "
+            f"{len(space)} parameters. Give the derivative of each output by each parameter, in this order."
+        )
+    require_finite(matrix, names, space, samples)
     pairs = [f"{name} with respect to {path}" for name in names for path in space.paths]
-    require_finite(derivatives.reshape(n, -1), pairs, space, values, what="The derivative of")
-    weights = bootstrap_weights(n, resamples, seed)
+    require_finite(derivatives.reshape(rows, -1), pairs, space, samples, what="The derivative of")
+    stretch = jax.vmap(space.slopes)(jnp.asarray(samples)) * (space.upper - space.lower)
+    shares = derivatives * np.asarray(stretch)[:, None]
+    weights = bootstrap_weights(rows, resamples, seed)
     # Both scaled by one deviation: their ratio is the same, and nothing is lost to a large mean.
     centred, spread = normalised(matrix), matrix.std(axis=0)
     spread = np.where(centred.any(axis=0), spread, 0.0)
     variance = weighted(weights, centred**2) - weighted(weights, centred) ** 2
-    squares = weighted(weights, derivatives.transpose(0, 2, 1) ** 2)
+    squares = weighted(weights, shares.transpose(0, 2, 1) ** 2)
     scale = np.where(spread > 0, variance * spread**2, np.inf)[:, None]
     nu, nu_conf = with_interval(squares, confidence)
     bound, bound_conf = with_interval(squares / (np.pi**2 * scale), confidence)
-    return DerivativeMeasures(space, names, spread**2, nu, nu_conf, bound, bound_conf, int(n), int(seed), confidence)
+    return DerivativeMeasures(space, names, spread**2, nu, nu_conf, bound, bound_conf, rows, int(seed), confidence)
 
 
 def screen(measures: DerivativeMeasures, threshold: float = 0.01) -> Screening:
@@ -139,7 +204,7 @@ class _WithSlopes(eqx.Module):
     """"auto", "forward" or "reverse"."""
 
     def __call__(self, target: Any) -> dict[tuple[str, Any], Float[Array, "..."]]:
-        """Outputs ("value", name), and their derivatives ("slope", name) over the unit cube, whose axis comes last.
+        """Outputs ("value", name), and their derivatives ("slope", name) by the values in SI, whose axis comes last.
 
         Args:
             target: values in SI (parameters,), or a model that has them.
@@ -156,6 +221,5 @@ class _WithSlopes(eqx.Module):
         count = sum(leaf.size for leaf in jax.tree.leaves(eqx.filter_eval_shape(twice, values)[0]))
         forward = self.mode == "forward" or (self.mode == "auto" and count >= len(self.space))
         slopes, found = (jax.jacfwd if forward else jax.jacrev)(twice, has_aux=True)(values)
-        stretch = self.space.slopes(values) * (self.space.upper - self.space.lower)
         by_name = {("value", name): value for name, value in zip(names, found, strict=True)}
-        return by_name | {("slope", name): slope * stretch for name, slope in zip(names, slopes, strict=True)}
+        return by_name | {("slope", name): slope for name, slope in zip(names, slopes, strict=True)}

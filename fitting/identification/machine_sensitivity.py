@@ -5,28 +5,23 @@ they add to the damping ratios is linear in them.
 """
 
 import dataclasses
-import functools
 from collections.abc import Sequence
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from fitting.identification.machine_affine import AffineMachine, affine_machine
 from fitting.identification.machine_evidence import Evidence, evidence
+from fitting.identification.machine_pairing import CHUNK, paired_samples
+from fitting.identification.machine_unknowns import unknowns
 from fitting.shared_out import shared_out
 from sensitivity import SobolIndices, SobolSamples, sobol_indices, sobol_samples
 from twin._checks import InputError
-from twin.correlation import assign
 from twin.modal.reference import ReferenceModes
 from twin.parameters import ParameterSpace
 from twin.structure import Machine
 
 SHAPE, DAMPING = "MACXP", "NDD²"
 """The two outputs of each reference mode."""
-# Samples solved at once: their matrices stay in the cache.
-_CHUNK = 64
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,6 +35,8 @@ class MachineSensitivity:
     most like it then stands in (modes of all positions,)."""
     problems: tuple[str, ...]
     """Names of the reference modes of all positions, without the kind of output."""
+    left_out: tuple[str, ...] = ()
+    """Paths of the parameters that were not studied but held in the middle of their bounds: their indices are 0."""
 
     def total(self, kind: str) -> np.ndarray:
         """Total effects on MACXP or NDD² (modes of all positions, parameters).
@@ -47,7 +44,7 @@ class MachineSensitivity:
         Args:
             kind: "MACXP" or "NDD²".
         """
-        return self.indices.ST[[self.indices.index(f"{kind} {name}") for name in self.problems]]
+        return self.indices.ST[[self.indices.index(name) for name in output_names(self.problems, (kind,))]]
 
     def searched(self, threshold: float = 0.01, *, interval: bool = False) -> np.ndarray:
         """Which parameters are searched for each reference mode: by their total effect on MACXP.
@@ -59,7 +56,7 @@ class MachineSensitivity:
         Returns:
             Mask (modes of all positions, parameters).
         """
-        half = self.indices.ST_conf[[self.indices.index(f"{SHAPE} {name}") for name in self.problems]]
+        half = self.indices.ST_conf[[self.indices.index(name) for name in output_names(self.problems, (SHAPE,))]]
         return self.total(SHAPE) + (half if interval else 0.0) > threshold
 
 
@@ -71,6 +68,7 @@ def machine_sensitivity(
     *,
     seed: int,
     n: int = 1024,
+    only: Sequence[str] | None = None,
     threshold: float = 0.3,
     confidence: float = 0.95,
     resamples: int = 100,
@@ -85,6 +83,8 @@ def machine_sensitivity(
         space: unknown stiffnesses and dampings of joints, with bounds.
         seed: seed of samples and intervals, from 1.
         n: base points, a power of two; n·(parameters + 2) samples.
+        only: paths of the parameters that are studied, as `screen_machine(...).kept`; all if not given. The others are
+            held in the middle of their bounds, have indices of 0 and are named as left out.
         threshold: least MACXP of a pair [-].
         confidence: probability that the intervals are made for.
         resamples: bootstrap samples that the intervals come from.
@@ -95,20 +95,67 @@ def machine_sensitivity(
 
     Raises:
         InputError: 64-bit mode off, a parameter that is no stiffness or damping of a joint, bounds missing, reference
-            data that cannot be compared, fewer modes than reference modes, a position off the rail.
+            data that cannot be compared, fewer modes than reference modes, a position off the rail, a path in `only`
+            that is not in the space, none of a stiffness among them.
     """
+    studied = (
+        space if only is None else space.subset([path for path in space.paths if path in space.subset(only).paths])
+    )
+    if not unknowns(studied).stiffness.size:
+        raise InputError("No stiffness is studied. Name at least one, as only stiffnesses move the modes.")
+    middle = space.unscaled((space.lower + space.upper) / 2)
+    machine = space.with_values(machine, middle)
     data = evidence(references, positions)
-    parts = [affine_machine(machine, space, one.position, one.outputs) for one in data]
+    parts = [affine_machine(machine, studied, one.position, one.outputs) for one in data]
+    require_modes(parts, data)
+    samples = sobol_samples(studied, n, seed=seed)
+    shape, damping, unpaired = mode_outputs(parts, data, samples, threshold=threshold, threads=threads)
+    problems = tuple(label for one in data for label in one.labels)
+    outputs = np.concatenate([shape, damping], axis=1)
+    indices = sobol_indices(
+        samples, outputs, outputs=output_names(problems), confidence=confidence, resamples=resamples
+    )
+    left_out = tuple(path for path in space.paths if path not in studied.paths)
+    return MachineSensitivity(_widened(indices, space), unpaired, problems, left_out)
+
+
+def output_names(problems: Sequence[str], kinds: Sequence[str] = (SHAPE, DAMPING)) -> list[str]:
+    """Names of the outputs of a study, kind by kind.
+
+    Args:
+        problems: names of the reference modes of all positions.
+        kinds: "MACXP", "NDD²" or both.
+    """
+    return [f"{kind} {name}" for kind in kinds for name in problems]
+
+
+def require_modes(parts: Sequence[AffineMachine], data: Sequence[Evidence]) -> None:
+    """Raise unless the machine has a mode for each reference mode.
+
+    Args:
+        parts: the machine at each position.
+        data: the reference modes at each position.
+
+    Raises:
+        InputError: fewer modes than reference modes.
+    """
     for one, part in zip(data, parts, strict=True):
         if one.omega.size > len(part.fixed):
             raise InputError(f"The machine has {len(part.fixed)} modes, fewer than {one.omega.size} reference modes.")
-    samples = sobol_samples(space, n, seed=seed)
-    shape, damping, unpaired = mode_outputs(parts, data, samples, threshold=threshold, threads=threads)
-    problems = tuple(label for one in data for label in one.labels)
-    names = [f"{kind} {name}" for kind in (SHAPE, DAMPING) for name in problems]
-    outputs = np.concatenate([shape, damping], axis=1)
-    indices = sobol_indices(samples, outputs, outputs=names, confidence=confidence, resamples=resamples)
-    return MachineSensitivity(indices, unpaired, problems)
+
+
+def _widened(indices: SobolIndices, space: ParameterSpace) -> SobolIndices:
+    """Indices of all parameters of a space from those of some: zero for the others."""
+    own = [space.paths.index(path) for path in indices.space.paths]
+
+    def wide(array: np.ndarray) -> np.ndarray:
+        full = np.zeros((*array.shape[:-1], len(space)))
+        full[..., own] = array
+        return full
+
+    tables = {name: wide(getattr(indices, name)) for name in ("S1_by_size", "S1_conf_by_size")}
+    tables |= {name: wide(getattr(indices, name)) for name in ("ST_by_size", "ST_conf_by_size")}
+    return dataclasses.replace(indices, space=space, groups=space.paths, **tables)
 
 
 def mode_outputs(
@@ -136,9 +183,9 @@ def mode_outputs(
     distinct = samples.distinct(paths)
     stiffness = distinct.values[:, kinds.stiffness]
     dampings = samples.values[:, kinds.damping]
-    starts = range(0, len(stiffness), _CHUNK)
+    starts = range(0, len(stiffness), CHUNK)
     tasks = [
-        (part, one, stiffness[i : i + _CHUNK], threshold) for part, one in zip(parts, data, strict=True) for i in starts
+        (part, one, stiffness[i : i + CHUNK], threshold) for part, one in zip(parts, data, strict=True) for i in starts
     ]
     done = shared_out(_solved, tasks, threads)
     shape, damping, missing = [], [], []
@@ -155,27 +202,5 @@ def mode_outputs(
 def _solved(task: tuple[AffineMachine, Evidence, np.ndarray, float]) -> tuple[np.ndarray, ...]:
     """MACXP, whether paired, known damping and damping factors of the mode of each reference mode, for some samples."""
     part, one, stiffness, threshold = task
-    values, shapes = np.linalg.eigh(part.stiffness_matrices(stiffness))
-    alike = one.alike(values, shapes, part.output_map)
-    order, paired = _paired(alike, threshold)
-    # Where a reference mode has no pair, the study needs a number all the same: that of the mode most like it.
-    order = np.where(paired, order, alike.argmax(axis=1))
-    value = np.take_along_axis(alike, order[:, None], axis=1)[:, 0]
-    own = np.take_along_axis(shapes, order[:, None], axis=2)
-    omega = np.sqrt(np.maximum(np.take_along_axis(values, order, axis=1), 1e-12 * np.abs(values[:, -1:])))
-    return value, paired, *part.damping_ratios(omega, own)
-
-
-def _paired(alike: Float[np.ndarray, "samples n references"], threshold: float) -> tuple[np.ndarray, np.ndarray]:
-    # A thread does not inherit what its starter set for a while.
-    with jax.enable_x64(True):
-        full = np.zeros((_CHUNK, *alike.shape[1:]))
-        full[: len(alike)] = alike
-        order, paired = _assigned(jnp.asarray(full), float(threshold))
-        return np.asarray(order)[: len(alike)], np.asarray(paired)[: len(alike)]
-
-
-@functools.partial(jax.jit, static_argnums=1)
-def _assigned(alike: jax.Array, threshold: float) -> tuple[jax.Array, jax.Array]:
-    pairs = jax.vmap(lambda one: assign(one, threshold=threshold))(alike)
-    return pairs.order, pairs.paired
+    found = paired_samples(part, one, stiffness, threshold)
+    return found.macxp, found.paired, *part.damping_ratios(found.omega, found.own)

@@ -22,8 +22,9 @@ IDENTIFICATION = POSITIONS[1:]
 """Positions z2 to z4, from which the machine is identified [m]; section 3.2."""
 VALIDATION = POSITIONS[:1]
 """Position z1, held back [m]."""
-DISTURBED = DISTURBABLE[20:64]
-"""Chosen: the 44 quantities that are disturbed, of those to which the modes are least sensitive; section 3.3."""
+DISTURBED = DISTURBABLE[:44]
+"""The 44 quantities that are disturbed: those to which the modes are least sensitive, by `evidence_sensitivity`;
+section 3.3."""
 # Excitation at the workpiece table, and frequencies of the responses: those of fig. 7.
 _EXCITATION = ("N6 x", "N6 y", "N6 z")
 _FREQUENCIES = np.arange(5.0, 501.0, 1.0)

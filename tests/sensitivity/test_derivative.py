@@ -4,7 +4,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from sensitivity import DerivativeMeasures, derivative_measures, screen
+from sensitivity import (
+    DerivativeMeasures,
+    derivative_measures,
+    derivative_samples,
+    measures_from_derivatives,
+    screen,
+)
 from tests.sensitivity_functions import (
     G_COEFFICIENTS,
     G_FUNCTION,
@@ -109,3 +115,26 @@ def test_round_trip(tmp_path):
     assert "64 points" in found._repr_html_()
     with pytest.raises(InputError, match="No output 'power'"):
         found.index("power")
+
+
+def test_derivatives_found_elsewhere_give_the_same():
+    """Derivatives by the values in SI; a log parameter is uniform, and differentiated, on its own scale."""
+    space = ParameterSpace([Parameter("x", "", -1.0, 3.0), Parameter("k", "N/m", 1e3, 1e7, scale="log")])
+    samples = derivative_samples(space, 64, seed=3)
+    x, k = samples.T
+    values = np.stack([x**2 + np.log(k), x * np.sqrt(k)], axis=1)
+    derivatives = np.stack([np.stack([2 * x, 1 / k], 1), np.stack([np.sqrt(k), x / np.sqrt(k) / 2], 1)], axis=1)
+    found = measures_from_derivatives(space, samples, values, derivatives, seed=3, outputs=["a", "b"])
+
+    def function(v):
+        return jnp.stack([v[0] ** 2 + jnp.log(v[1]), v[0] * jnp.sqrt(v[1])])
+
+    traced = derivative_measures(function, space, seed=3, n=64, outputs=["a", "b"])
+    assert found.outputs == traced.outputs and found.n == traced.n
+    for name in ("variance", "nu", "nu_conf", "bound", "bound_conf"):
+        np.testing.assert_allclose(getattr(found, name), getattr(traced, name), rtol=1e-10)
+    with pytest.raises(InputError, match="derivatives has the shape"):
+        measures_from_derivatives(space, samples, values, derivatives[:, :1], seed=3)
+    derivatives[5, 1, 0] = np.nan
+    with pytest.raises(InputError, match="The derivative of 'b with respect to x' of sample 5"):
+        measures_from_derivatives(space, samples, values, derivatives, seed=3, outputs=["a", "b"])

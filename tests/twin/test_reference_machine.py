@@ -99,7 +99,11 @@ def test_each_unknown_shows_in_the_modes(machine):
 
 
 def test_weak_quantities_are_weak(machine, nominal):
-    """All of the 44 least sensitive changed by 1 to 5 % move no frequency by a percent."""
+    """All of the 44 least sensitive changed by 1 to 5 % move no frequency by a percent but the first.
+
+    There the whole feed drive stretches, and half of the springs in its chain are among the 44: they move next to
+    nothing but this one frequency, by less than half of their change.
+    """
     paths = tuple(q.path for q in DISTURBABLE[:44])
     values = np.array([get_leaf(machine, path) for path in paths])
     random = np.random.default_rng(1)
@@ -109,7 +113,8 @@ def test_weak_quantities_are_weak(machine, nominal):
         for z in POSITIONS:
             frequency, _, _ = modes_at(changed, jnp.asarray(z))
             moved = np.abs(np.asarray(frequency / nominal[z][0]) - 1)[:MODES]
-            assert 0 < moved.max() < 0.01
+            assert 0 < moved[1:].max() < 0.01
+            assert moved[0] < 0.025
 
 
 def test_modes_are_smooth_in_the_position(machine):

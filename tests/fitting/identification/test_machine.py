@@ -94,8 +94,8 @@ def test_a_mode_that_is_none_is_reported_and_left_out():
 def test_disturbed_model_with_what_is_uncertain_let_go():
     plain = identify_truth(4, model=disturbed_machine(4))
     found = identify_truth(4, model=disturbed_machine(4), uncertain=DISTURBED)
-    assert np.median(np.abs(found.stiffness)) < 0.002 < np.median(np.abs(plain.stiffness))
-    assert np.abs(found.stiffness).max() < 0.01
+    assert 5 * np.median(np.abs(found.stiffness)) < np.median(np.abs(plain.stiffness))
+    assert np.abs(found.stiffness).max() < 0.005 < np.abs(plain.stiffness).max()
     truth = random_truth(4)
     held_back = conformity_of(found.identification.machine, truth, VALIDATION)
     assert held_back.macxp.worst > 99

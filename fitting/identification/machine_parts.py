@@ -26,6 +26,8 @@ from twin.structure import Machine
 
 # Problems are filled up to one of these numbers of parameters: each is a program to compile.
 _SIZES = (3, 5, 9, 16)
+# Lanes of a program: each step is many short operations, whose calls cost less beside more lanes.
+_WIDTH = 32
 
 
 def solve_parts(
@@ -97,7 +99,8 @@ def solve_parts(
     labels = tuple(label for one in data for label in one.labels)
     value, steps, followed = values.copy(), np.zeros((count, starts), dtype=int), np.full((count, starts), np.nan)
     stop = np.full((count, starts), "nothing_searched", dtype=object)
-    todo = np.repeat(mask.any(axis=1)[:, None], starts, axis=1)
+    wanted = mask.sum(axis=1)[:, None] > 0
+    todo = np.repeat(wanted, starts, axis=1)
     value[todo], followed[todo], stop[todo], steps[todo] = _solved(problems, values, todo, data_from_start, **settings)
     macxp = best_macxp(owner, value, threads)
     runs = PartRuns(
@@ -105,7 +108,7 @@ def solve_parts(
     )
     begin = np.where(np.isfinite(value).all(axis=2, keepdims=True), value, values)
     for _ in range(rounds):
-        todo = runs.failed & mask.any(axis=1)[:, None]
+        todo = runs.failed & wanted
         if not todo.any():
             break
         ended = _solved(problems, begin, todo, data_from_mode, **settings)
@@ -139,7 +142,7 @@ def _solved(
         space = ParameterSpace([Parameter(f"share.{i}", "", 0.0, 1.0, size=1.0) for i in range(size)])
         objective = Objective(Unlikeness(common), Shares(jnp.full(size, 0.5)), space)
         task = Task(first, np.where(free, 0.0, 0.5), np.where(free, 1.0, 0.5), stacked)
-        ended = solve_lanes(objective, task, solver, max_steps=max_steps, combine=_own, threads=threads)
+        ended = solve_lanes(objective, task, solver, max_steps=max_steps, combine=_own, width=_WIDTH, threads=threads)
         at = 0
         for i in chosen:
             one, own = problems[i], slice(at, at + todo[i].sum())

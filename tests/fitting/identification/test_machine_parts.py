@@ -203,10 +203,12 @@ def test_a_planted_wrong_mode_is_found_out_and_solved_again(monkeypatch):
     mask = mask_of({1: SEARCHED[:2], 2: SEARCHED[:2]})
 
     def planted(problem, values):
-        data = PartData(*data_from_start(problem, values))
+        fields = [field.name for field in dataclasses.fields(PartData)]
+        leaves = dict(zip(fields, data_from_start(problem, values), strict=True))
         # The start becomes another mode, and the frequency to begin near that mode's own.
-        start, near = np.tile(np.eye(data.start.shape[1])[9], (len(values), 1)), data.eigenvalues[:, 9]
-        return tuple(vars(dataclasses.replace(data, start=start, near=near)).values())
+        leaves["start"] = np.tile(np.eye(leaves["start"].shape[1])[9], (len(values), 1))
+        leaves["near"] = leaves["eigenvalues"][:, 9]
+        return tuple(leaves.values())
 
     def runs(**options):
         return solve_parts(nominal(), measured(), PLACES, space(), mask, seed=4, starts=4, **options)

@@ -215,7 +215,7 @@ def _rows(task: Task, numbers: np.ndarray) -> Task:
 def _problem(solver: Solver, objective: Objective, combine: Combine | None, lane: Task) -> tuple[Objective, Any, dict]:
     """Objective, function and options of the fit in one lane."""
     own = objective if combine is None else combine(objective, lane.data)
-    options = options_of(own, jnp.asarray(lane.lower), jnp.asarray(lane.upper))
+    options = {**options_of(own, jnp.asarray(lane.lower), jnp.asarray(lane.upper)), "together": True}
     return own, residual_of if isinstance(solver, BoundedLevenbergMarquardt) else cost_of, options
 
 

@@ -81,3 +81,31 @@ def eliminated(
         return (work - others[:, None] * pivot_row).at[j].set(pivot_row)
 
     return jax.lax.fori_loop(0, n, eliminate, jnp.concatenate([matrices, right], axis=1))[:, n:]
+
+
+def solved_alone(matrix: Inexact[Array, "n n"], right: Inexact[Array, "n"]) -> Inexact[Array, "n"]:
+    """The solution x of one system A·x = b, by the same elimination as `eliminated`, to the last bit.
+
+    Rows stay where they are and are put in order at the end: where the caller batches single systems by `jax.vmap`,
+    whose axis comes first, this takes half the time.
+
+    Args:
+        matrix: A.
+        right: b.
+    """
+    n = right.size
+    row = jnp.arange(n)
+
+    def eliminate(j: Array, carry: tuple) -> tuple:
+        work, free, order = carry
+        column = work[:, j]
+        size = jnp.abs(jnp.real(column)) + jnp.abs(jnp.imag(column))
+        chosen = jnp.argmax(jnp.where(free, size, -1.0))
+        here = row == chosen
+        pivot_row = work[chosen] / column[chosen]
+        work = jnp.where(here[:, None], pivot_row, work - column[:, None] * pivot_row)
+        return work, free & ~here, jnp.where(row == j, chosen, order)
+
+    begin = (jnp.concatenate([matrix, right[:, None]], axis=1), jnp.ones(n, dtype=bool), jnp.zeros_like(row))
+    work, _, order = jax.lax.fori_loop(0, n, eliminate, begin)
+    return work[:, n][order]

@@ -1,7 +1,7 @@
 """How unlike a reference mode a machine's mode is, as a function of a few springs, with its gradient.
 
-All other springs are held, so the machine's modes with the searched springs at the middle of their bounds are solved
-once; what a change of the few does to one mode is then found without the others (`twin.modal.updated`).
+All other springs are held, so the machine's modes with the searched springs at some values are solved once; what a
+change of the few does to one mode is then found without the others (`twin.modal.updated`).
 """
 
 import equinox as eqx
@@ -32,12 +32,16 @@ class PartData(eqx.Module):
     """Stiffness that the whole range of a parameter's share stands for [N/m, Nm/rad]."""
     owner: Int[Array, "rows"]
     """Parameter that each place belongs to."""
+    base: Float[Array, "parameters"]
+    """Shares of the machine before the change [-]."""
     gram: Float[Array, "n n"]
     """ΨᵀΨ of the shapes Ψ of these modes at the outputs."""
     cross: Float[Array, "n"]
     """Ψᵀφ₀ with the reference shape φ₀ of unit length."""
     start: Float[Array, "n"]
-    """The reference shape, expanded to these modes."""
+    """Shape that the mode is sought from: the reference shape, expanded to these modes, or one of these modes."""
+    near: Float[Array, ""]
+    """Eigenvalue that the mode is sought near [1/s²]; NaN to go by the shape alone."""
     omega: Float[Array, ""]
     """Angular frequency of the reference mode [rad/s]."""
     ratio: Float[Array, ""]
@@ -65,14 +69,14 @@ def unlikeness(share: Float[Array, "parameters"], data: PartData) -> tuple[Array
     """1 - MACXP of the machine's mode that is like the reference mode, and its gradient by one adjoint solution.
 
     Args:
-        share: searched stiffnesses as shares of their ranges; a half is the machine before the change.
+        share: searched stiffnesses as shares of their ranges.
         data: the problem.
 
     Returns:
         1 - MACXP, NaN where the iteration found no mode, and its derivatives by the shares.
     """
-    change = (share[data.owner] - 0.5) * data.weight
-    mode = updated_mode(data.eigenvalues, data.vectors, change, data.start, data.omega**2)
+    change = (share - data.base)[data.owner] * data.weight
+    mode = updated_mode(data.eigenvalues, data.vectors, change, data.start, data.near)
     value, shape = mode.eigenvalue, mode.shape
     moved = data.gram @ shape
     length, along = shape @ moved, data.cross @ shape

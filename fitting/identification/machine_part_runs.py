@@ -45,7 +45,9 @@ class PartRuns:
     stop: np.ndarray
     """Why each run ended (problems, runs)."""
     steps: Int[np.ndarray, "problems runs"]
-    """Steps of each run."""
+    """Steps of each run, those when it was solved again counted."""
+    again: Int[np.ndarray, "problems runs"]
+    """How often each run was solved again, as it had failed."""
 
     @property
     def strayed(self) -> Bool[np.ndarray, "problems runs"]:
@@ -56,6 +58,11 @@ class PartRuns:
     def failed(self) -> Bool[np.ndarray, "problems runs"]:
         """Runs that did not converge, or that strayed: they count for nothing."""
         return ~np.isin(self.stop, CONVERGED) | self.strayed | ~np.isfinite(self.macxp)
+
+    @property
+    def mended(self) -> Bool[np.ndarray, "problems runs"]:
+        """Runs that had failed and came right when they were solved again."""
+        return (self.again > 0) & ~self.failed
 
     @property
     def on_bound(self) -> Bool[np.ndarray, "problems runs stiffnesses"]:
@@ -78,7 +85,7 @@ class PartRuns:
         columns = {"problem": np.repeat(self.problems, runs), "run": np.tile(np.arange(runs), problems)}
         for i, path in enumerate(self.paths):
             columns[path] = np.where(searched, self.value, np.nan)[..., i].ravel()
-        last = {"macxp": self.macxp, "stop": self.stop, "steps": self.steps, "failed": self.failed}
+        last = {"macxp": self.macxp, "stop": self.stop, "steps": self.steps, "again": self.again, "failed": self.failed}
         return pd.DataFrame(columns | {name: array.ravel() for name, array in last.items()})
 
     def summary(self) -> "pd.DataFrame":
@@ -90,13 +97,18 @@ class PartRuns:
             "macxp median": np.nanmedian(self.macxp, axis=1),
             "macxp best": np.nanmax(self.macxp, axis=1),
             "steps": self.steps.mean(axis=1),
+            "solved again": (self.again > 0).sum(axis=1),
+            "came right": self.mended.sum(axis=1),
             "strayed": self.strayed.sum(axis=1),
             "failed": self.failed.sum(axis=1),
         }
         return pd.DataFrame(rows, index=pd.Index(self.problems, name="problem"))
 
     def __repr__(self) -> str:
-        count = f"{self.failed.sum()} of {self.failed.size} runs failed, {self.strayed.sum()} of them on another mode"
+        count = (
+            f"{(self.again > 0).sum()} of {self.failed.size} runs were solved again, {self.mended.sum()} came right. "
+        )
+        count += f"{self.failed.sum()} runs failed, {self.strayed.sum()} of them on another mode"
         return f"{self.summary().to_string(float_format=lambda x: f'{x:.4g}')}\n{count}."
 
 

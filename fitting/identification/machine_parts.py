@@ -3,15 +3,17 @@
 Source: section 2.3.2 of J. Ellinger, M. F. Zaeh, Machines 10 (2022) 535.
 """
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Callable, Sequence
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool
 
-from fitting.identification.machine_affine import AffineMachine, affine_machine
-from fitting.identification.machine_evidence import Evidence, evidence
+from fitting.identification.machine_affine import affine_machine
+from fitting.identification.machine_evidence import evidence
 from fitting.identification.machine_likeness import PartData, Shares, Unlikeness
+from fitting.identification.machine_part_data import PartProblem, data_from_mode, data_from_start, shares_of
 from fitting.identification.machine_part_runs import PartRuns, best_macxp
 from fitting.lanes import Task, solve_lanes
 from fitting.objective import Objective
@@ -24,9 +26,8 @@ from twin.structure import Machine
 
 # Problems are filled up to one of these numbers of parameters: each is a program to compile.
 _SIZES = (3, 5, 9, 16)
-# Weight of the strain energy where a reference shape is expanded to unmeasured coordinates.
-_STRAIN = 1e-6
-_CHUNK = 100
+# Lanes of a program: each step is many short operations, whose calls cost less beside more lanes.
+_WIDTH = 32
 
 
 def solve_parts(
@@ -40,9 +41,13 @@ def solve_parts(
     starts: int = 100,
     max_steps: int = 100,
     solver: SLSQP | None = None,
+    rounds: int = 2,
     threads: int | None = None,
 ) -> PartRuns:
     """Search, for each reference mode, the springs that move it for the greatest MACXP, from many random starts.
+
+    Runs that fail are solved again, from where they ended and from the mode that is most alike there. What comes right
+    replaces the run; what does not leaves it as it was, marked.
 
     Args:
         machine: machine; its values of the unknown parameters play no part.
@@ -55,6 +60,7 @@ def solve_parts(
         starts: runs of each problem.
         max_steps: steps after which a run is given up.
         solver: SLSQP with its settings.
+        rounds: how often a run that failed is solved again; each time takes up to `max_steps` more.
         threads: runs side by side; the number of cores if not given.
 
     Returns:
@@ -62,7 +68,7 @@ def solve_parts(
 
     Raises:
         InputError: 64-bit mode off, a parameter that is no stiffness or damping of a joint, reference data that cannot
-            be compared, a mask of another shape, fewer than two starts.
+            be compared, a mask of another shape, fewer than two starts, a negative number of rounds.
     """
     data = evidence(references, positions)
     parts = [affine_machine(machine, space, one.position, one.outputs) for one in data]
@@ -74,82 +80,109 @@ def solve_parts(
         )
     if starts < 2:
         raise InputError(f"starts must be at least 2, but is {starts}: runs are judged by how far they agree.")
+    if rounds < 0:
+        raise InputError(f"rounds must not be negative, but is {rounds}. Take 0 to solve no run again.")
     mask = mask[:, parts[0].stiffness]
     drawn = np.random.default_rng(seed).random((count, starts, mask.shape[1]))
     bounds = np.asarray([(p.lower, p.upper) for p in space.parameters])[parts[0].stiffness]
     values = bounds[:, 0] + drawn * (bounds[:, 1] - bounds[:, 0])
+    sizes = sorted({*_SIZES, mask.shape[1]})
+    size = np.asarray([next(n for n in sizes if n >= m) for m in mask.sum(axis=1)])
     owner = [(part, one, mode) for part, one in zip(parts, data, strict=True) for mode in range(one.omega.size)]
-
-    found, steps, followed = values.copy(), np.zeros((count, starts), dtype=int), np.full((count, starts), np.nan)
-    stop = np.full((count, starts), "nothing_searched", dtype=object)
-    least = 0
+    places = np.asarray([mask[i][owner[i][0].spring_of].sum() for i in range(count)])
+    # Problems of one size share a program.
+    rows = [int(places[size == n].max()) for n in size]
+    problems = [PartProblem(*owner[i], mask[i], bounds, rows[i], int(size[i])) for i in range(count)]
     solver = SLSQP(rtol=0.0, atol=1e-8, history_length=1) if solver is None else solver
-    for size in sorted({*_SIZES, mask.shape[1]}):
-        chosen = np.flatnonzero((mask.sum(axis=1) > least) & (mask.sum(axis=1) <= size))
-        least = max(least, size)
-        if chosen.size == 0:
-            continue
-        rows = max(int(mask[i][owner[i][0].spring_of].sum()) for i in chosen)
-        tasks = [(*owner[i], mask[i], values[i], bounds, rows) for i in chosen]
-        made = shared_out(_prepared, tasks, threads)
+    settings = {"solver": solver, "max_steps": max_steps, "threads": threads}
+
+    labels = tuple(label for one in data for label in one.labels)
+    value, steps, followed = values.copy(), np.zeros((count, starts), dtype=int), np.full((count, starts), np.nan)
+    stop = np.full((count, starts), "nothing_searched", dtype=object)
+    wanted = mask.sum(axis=1)[:, None] > 0
+    todo = np.repeat(wanted, starts, axis=1)
+    value[todo], followed[todo], stop[todo], steps[todo] = _solved(problems, values, todo, data_from_start, **settings)
+    macxp = best_macxp(owner, value, threads)
+    runs = PartRuns(
+        space, parts[0].stiffness, labels, mask, values, value, macxp, followed, stop, steps, np.zeros_like(steps)
+    )
+    begin = np.where(np.isfinite(value).all(axis=2, keepdims=True), value, values)
+    for _ in range(rounds):
+        todo = runs.failed & wanted
+        if not todo.any():
+            break
+        ended = _solved(problems, begin, todo, data_from_mode, **settings)
+        runs, begin = _mended(runs, owner, begin, todo, ended, threads)
+    return runs
+
+
+def _solved(
+    problems: list[PartProblem],
+    begin: np.ndarray,
+    todo: np.ndarray,
+    prepare: Callable[[PartProblem, np.ndarray], tuple[np.ndarray, ...]],
+    *,
+    solver: SLSQP,
+    max_steps: int,
+    threads: int | None,
+) -> tuple[np.ndarray, ...]:
+    """Values, MACXP followed, reasons for stopping and steps of the runs to do, problem by problem."""
+    value, followed = begin.copy(), np.full(todo.shape, np.nan)
+    stop, steps = np.full(todo.shape, "running", dtype=object), np.zeros(todo.shape, dtype=int)
+    busy = np.flatnonzero(todo.any(axis=1))
+    for size in sorted({problems[i].size for i in busy}):
+        chosen = [i for i in busy if problems[i].size == size]
+        made = shared_out(lambda i: prepare(problems[i], begin[i][todo[i]]), chosen, threads)
         common = PartData(*(jnp.asarray(leaf[0]) for leaf in made[0]))
         stacked = tuple(np.concatenate(leaves) for leaves in zip(*made, strict=True))
-        first = np.concatenate([_padded(drawn[i][:, mask[i]], size) for i in chosen])
-        upper = np.concatenate([np.tile(np.arange(size) < mask[i].sum(), (starts, 1)) for i in chosen])
-        free = ParameterSpace([Parameter(f"share.{i}", "", 0.0, 1.0, size=1.0) for i in range(size)])
-        objective = Objective(Unlikeness(common), Shares(jnp.full(size, 0.5)), free)
-        low, high = np.where(upper, 0.0, 0.5), np.where(upper, 1.0, 0.5)
-        ended = solve_lanes(
-            objective,
-            Task(first, low, high, stacked),
-            solver,
-            max_steps=max_steps,
-            combine=_own,
-            threads=threads,
+        first = np.concatenate([shares_of(problems[i], begin[i][todo[i]]) for i in chosen])
+        free = np.concatenate(
+            [np.tile(np.arange(size) < problems[i].searched.sum(), (todo[i].sum(), 1)) for i in chosen]
         )
-        for k, i in enumerate(chosen):
-            own = slice(k * starts, (k + 1) * starts)
-            width = bounds[mask[i], 1] - bounds[mask[i], 0]
-            found[i][:, mask[i]] = bounds[mask[i], 0] + ended.vector[own, : int(mask[i].sum())] * width
-            stop[i], steps[i], followed[i] = ended.stop[own], ended.steps[own], 1 - ended.cost[own]
-    problems = tuple(label for one in data for label in one.labels)
-    macxp = best_macxp(owner, found, threads)
-    return PartRuns(space, parts[0].stiffness, problems, mask, values, found, macxp, followed, stop, steps)
+        space = ParameterSpace([Parameter(f"share.{i}", "", 0.0, 1.0, size=1.0) for i in range(size)])
+        objective = Objective(Unlikeness(common), Shares(jnp.full(size, 0.5)), space)
+        task = Task(first, np.where(free, 0.0, 0.5), np.where(free, 1.0, 0.5), stacked)
+        ended = solve_lanes(objective, task, solver, max_steps=max_steps, combine=_own, width=_WIDTH, threads=threads)
+        at = 0
+        for i in chosen:
+            one, own = problems[i], slice(at, at + todo[i].sum())
+            at = own.stop
+            low, high = one.bounds[one.searched].T
+            # Only the searched stiffnesses of the runs to do.
+            value[i][np.ix_(todo[i], one.searched)] = low + ended.vector[own, : low.size] * (high - low)
+            stop[i][todo[i]], steps[i][todo[i]] = ended.stop[own], ended.steps[own]
+            followed[i][todo[i]] = 1 - ended.cost[own]
+    return value[todo], followed[todo], stop[todo], steps[todo]
+
+
+def _mended(
+    runs: PartRuns, owner: list, begin: np.ndarray, todo: np.ndarray, ended: tuple[np.ndarray, ...], threads: int | None
+) -> tuple[PartRuns, np.ndarray]:
+    """The runs with those replaced that came right, and where the others begin the next time."""
+    value, followed, stop, steps = ended
+    values = np.full_like(begin, np.nan)
+    values[todo] = value
+    macxp = best_macxp(owner, values, threads)
+
+    def put(old: np.ndarray, new: np.ndarray) -> np.ndarray:
+        whole = old.copy()
+        whole[todo] = new
+        return whole
+
+    tried = dataclasses.replace(
+        runs, value=values, macxp=macxp, followed=put(runs.followed, followed), stop=put(runs.stop, stop)
+    )
+    right = todo & ~tried.failed
+    kept = {
+        name: np.where(right[..., None] if name == "value" else right, getattr(tried, name), getattr(runs, name))
+        for name in ("value", "macxp", "followed", "stop")
+    }
+    further = todo & np.isfinite(macxp)
+    return (
+        dataclasses.replace(runs, **kept, steps=put(runs.steps, runs.steps[todo] + steps), again=runs.again + todo),
+        np.where(further[..., None], values, begin),
+    )
 
 
 def _own(objective: Objective, data: tuple) -> Objective:
     return Objective(Unlikeness(PartData(*data)), objective.model, objective.space)
-
-
-def _padded(shares: np.ndarray, size: int) -> np.ndarray:
-    return np.concatenate([shares, np.full((len(shares), size - shares.shape[1]), 0.5)], axis=1)
-
-
-def _prepared(task: tuple[AffineMachine, Evidence, int, np.ndarray, np.ndarray, np.ndarray, int]) -> tuple:
-    """What `PartData` holds, for all runs of one problem."""
-    part, one, mode, searched, values, bounds, rows = task
-    runs, n = len(values), len(part.fixed)
-    middle = np.where(searched, bounds.mean(axis=1), values)
-    eigenvalues, basis = np.linalg.eigh(part.stiffness_matrices(middle))
-    places = np.flatnonzero(searched[part.spring_of])
-    vectors = np.zeros((runs, n, rows))
-    vectors[:, :, : places.size] = np.swapaxes(basis, 1, 2) @ part.springs[:, places]
-    number = np.cumsum(searched) - 1
-    weight, owner = np.zeros(rows), np.zeros(rows, dtype=int)
-    weight[: places.size] = (bounds[:, 1] - bounds[:, 0])[part.spring_of[places]]
-    owner[: places.size] = number[part.spring_of[places]]
-    gram = part.output_map.T @ part.output_map
-    cross = part.output_map.T @ one.shapes[:, mode]
-    strain = part.stiffness_matrices(bounds.mean(axis=1)[None])[0] / one.omega[mode] ** 2
-    expanded = np.linalg.solve(gram + _STRAIN * np.trace(gram) / n * strain, cross)
-    return (
-        eigenvalues,
-        vectors,
-        np.tile(weight, (runs, 1)),
-        np.tile(owner, (runs, 1)),
-        np.swapaxes(basis, 1, 2) @ (gram @ basis),
-        np.swapaxes(basis, 1, 2) @ cross,
-        np.swapaxes(basis, 1, 2) @ expanded,
-        np.full(runs, one.omega[mode]),
-        np.full(runs, one.ratio[mode]),
-    )

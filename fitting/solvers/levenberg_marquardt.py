@@ -13,6 +13,9 @@ from jaxtyping import Array, Bool, Float, Int, PyTree
 from fitting.solvers.stop import Stop
 from fitting.solvers.trust_region import LinearModel, linear_model
 
+# Root mean square of a weighted residual [-], and its norm as a share of that at the start, at which data are exact.
+_EXACT, _LEFT = 1e-6, 1e-7
+
 
 class BoundedState(eqx.Module):
     """State of the bounded Levenberg-Marquardt solver at its best point so far."""
@@ -63,7 +66,8 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
     for good.
 
     It has converged when the linear model promises nothing more (`rtol` on the relative offset), when the undamped step
-    is negligible (`xtol`, or what rounding makes of the residual), or when no step helps where the gradient is zero.
+    is negligible (`xtol`, or what rounding makes of the residual), or when no step helps where the gradient is zero, or
+    where of exact data no residual is left but rounding.
 
     Bounds are passed as `options={"lower": ..., "upper": ...}`, in the structure of y. The residual and its Jacobian
     are evaluated together, by forward mode, once a step.
@@ -150,7 +154,7 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         predicted = 0.5 * model.promised(z)
 
         offset = jnp.sqrt(jnp.abs(model.promised(newton)) / jnp.where(model.squares > 0, model.squares, 1.0))
-        reason = self._reason(model, point, newton, offset, ~accept, radius, predicted)
+        reason = self._reason(model, point, newton, offset, ~accept, radius, predicted, at_start, residual.size)
         hopeless = first & ~good
         steps = state.steps + 1
         new_state = BoundedState(
@@ -184,6 +188,8 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         rejected: Array,
         radius: Array,
         predicted: Array,
+        at_start: Array,
+        rows: int,
     ) -> Stop:
         eps = jnp.finfo(point.dtype).eps
         # What rounding of the variables makes of the residual, and what the model would still change of it.
@@ -197,10 +203,12 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         stuck = drowned | (predicted <= 0) | (rejected & (radius <= shortest))
         # Where the Jacobian is singular the offset stays large, though the gradient is zero.
         level = (offset < 1e-5) | (change <= rounding) | (model.cosine() < 1e-6)
+        # Nothing of the data is left, by their own weights and beside the start: the rest is rounding of the model.
+        exact = (model.squares <= _EXACT**2 * rows) & (model.squares <= _LEFT**2 * at_start)
         # A residual that nothing moves is no minimum.
         movable = model.lower < model.upper
         blind = jnp.any(movable) & ~jnp.any(movable & model.seen) & (model.squares > self.atol**2)
-        reason = Stop.where(stuck, Stop.where(level, Stop.at_precision, Stop.stalled), Stop.running)
+        reason = Stop.where(stuck, Stop.where(level | exact, Stop.at_precision, Stop.stalled), Stop.running)
         return Stop.where(blind, Stop.stalled, Stop.where(done, Stop.converged, reason))
 
     def terminate(

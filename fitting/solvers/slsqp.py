@@ -70,7 +70,9 @@ class SLSQP(optx.AbstractMinimiser):
     (y, args) that return an array that shall be 0, or ≥ 0; "in_aux": instead of these functions how many of each the
     objective's auxiliary output holds, a vector with the equalities first, computed together with it; "factor": a
     first L, for instance the triangular factor of a Gauss-Newton Hessian, transposed; "autodiff_mode": "fwd" (default:
-    few unknowns) or "rev". One step is one evaluation.
+    few unknowns) or "rev"; "together": whether values and derivatives are evaluated at once (for batches, which
+    evaluate the derivatives of every trial anyway; by default those of a rejected trial are left out). One step is one
+    evaluation.
     """
 
     rtol: float = 1e-10
@@ -128,12 +130,15 @@ class SLSQP(optx.AbstractMinimiser):
         start = jnp.clip(flat, lower, upper)
         trial = jnp.where(first, start, jnp.clip(flat + state.length * state.direction, lower, upper))
 
-        def evaluate(point: Array) -> tuple[Array, PyTree]:
+        def evaluate(point: Array) -> tuple[Array, tuple[Array, PyTree]]:
             value, aux = fn(unravel(point), args)
             constraints = aux if "in_aux" in options else _constraints(options, unravel(point), args)
-            return jnp.concatenate([jnp.reshape(value, (1,)), constraints]), aux
+            values = jnp.concatenate([jnp.reshape(value, (1,)), constraints])
+            return values, (values, aux)
 
-        values, aux = evaluate(trial)
+        mode = jax.jacrev if options.get("autodiff_mode", "fwd") == "rev" else jax.jacfwd
+        derivatives = mode(evaluate, has_aux=True)
+        slopes, (values, aux) = derivatives(trial) if options.get("together") else (None, evaluate(trial)[1])
         merit = _merit(values, state.penalties, equalities, state.restoring)
         before = _merit(_stacked(state.here), state.penalties, equalities, state.restoring)
         change = merit - before
@@ -142,13 +147,12 @@ class SLSQP(optx.AbstractMinimiser):
         rounding = 4 * jnp.finfo(flat.dtype).eps * jnp.abs(before)
         good = finite & (first | (change <= 0.1 * expected + rounding))
 
-        def derivatives() -> Array:
-            mode = jax.jacrev if options.get("autodiff_mode", "fwd") == "rev" else jax.jacfwd
-            return mode(lambda point: evaluate(point)[0])(trial)
-
         old = jnp.concatenate([state.here.gradient[None], state.here.normals])
-        # One evaluation on its own leaves out the derivatives of a rejected trial.
-        jacobian = jax.lax.cond(good, derivatives, lambda: old)
+        if slopes is None:
+            # One evaluation on its own leaves out the derivatives of a rejected trial.
+            jacobian = jax.lax.cond(good, lambda: derivatives(trial)[0], lambda: old)
+        else:
+            jacobian = jnp.where(good, slopes, old)
         smooth = jnp.all(jnp.isfinite(jacobian))
         accept = good & smooth
         there = Evaluation(values[0], jacobian[0], values[1:], jacobian[1:])

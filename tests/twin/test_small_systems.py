@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from twin._small_systems import MOST, solve_many
+from twin._small_systems import MOST, eliminated, solve_many, solved_alone
 
 
 def systems(n, columns, count, seed=0):
@@ -60,3 +60,13 @@ def test_derivatives_in_both_modes():
     evaluate = jax.jit(size)
     up, down = (evaluate(*(x + h * d for x, d in zip(at, along, strict=True))) for h in (1e-6, -1e-6))
     assert forward == pytest.approx(float(up - down) / 2e-6, rel=1e-8)
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 16])
+def test_one_system_alone_is_solved_as_among_many(n):
+    a, b = systems(n, 1, 5)
+    alone = jax.vmap(solved_alone)(jnp.moveaxis(a, -1, 0), jnp.moveaxis(b[:, 0], -1, 0))
+    np.testing.assert_allclose(alone.T, eliminated(a, b)[:, 0], rtol=1e-12)
+    swapped = solved_alone(jnp.asarray([[0.0, 1.0], [2.0, 0.0]]), jnp.asarray([3.0, 4.0]))
+    np.testing.assert_array_equal(swapped, [2.0, 3.0])
+    assert not np.any(np.isfinite(solved_alone(jnp.zeros((2, 2)), jnp.ones(2))))

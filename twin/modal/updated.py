@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from twin._small_systems import eliminated
+from twin._small_systems import solved_alone
 
 # Each step trebles the digits: from a shape some way off four are enough. At this error the eigenvalue is exact.
 _STEPS, _ERROR = 8, 1e-9
@@ -45,7 +45,7 @@ def updated_mode(
         change: of each spring the change of its stiffness Δk [N/m].
         start: coordinates in these modes of a shape to begin with; need not be normalised.
         near: eigenvalue to begin near [1/s²]. If given, the first step picks, from a start that is a mixture of modes,
-            those that are near to it; if not, it begins with the Rayleigh quotient of the start.
+            those that are near to it; if not, or if it is NaN, it begins with the Rayleigh quotient of the start.
 
     Returns:
         The eigenpair. Derivatives are those of a distinct eigenvalue.
@@ -176,7 +176,7 @@ class Shifted(eqx.Module):
             right: b.
         """
         moved = self.inverse * right
-        forces = eliminated(self.small[..., None], (self.change * (moved @ self.vectors))[:, None, None])[:, 0, 0]
+        forces = solved_alone(self.small, self.change * (moved @ self.vectors))
         return moved - self.inverse * (self.vectors @ forces)
 
 

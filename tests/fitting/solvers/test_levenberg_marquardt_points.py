@@ -77,6 +77,31 @@ def test_a_residual_that_nothing_moves_is_no_success():
     np.testing.assert_array_equal(solution.value, [1.0, 2.0])
 
 
+def _in_steps(size):
+    """Exact data of a model whose values come in steps, with the slopes of the smooth one."""
+
+    def function(x, _):
+        smooth = x[0] * jnp.exp(-x[1] * TIMES) - 2 * np.exp(-1.3 * TIMES)
+        return smooth + jax.lax.stop_gradient(size * (jnp.round(smooth / size) + 0.3) - smooth)
+
+    return function
+
+
+@pytest.mark.parametrize(
+    ("size", "start", "stop"),
+    [
+        (1e-9, [1.0, 1.0], Stop.at_precision),
+        # Much is left by the weights of the data, however far the start was; or beside the start, however small.
+        (1e-3, [1e8, 1.0], Stop.stalled),
+        (1e-9, [2.0 + 1e-6, 1.3], Stop.stalled),
+    ],
+)
+def test_a_stall_where_nothing_of_the_data_is_left_is_a_success(size, start, stop):
+    solution = _solve(_in_steps(size), start)
+    assert _reason(solution) == _name(stop)
+    np.testing.assert_allclose(solution.value, [2.0, 1.3], rtol=10 * size)
+
+
 def test_a_variable_that_nothing_depends_on_stays():
     solution = _solve(lambda x, _: _decay(x, _) + 0 * x[2], [1.0, 1.0, 7.0])
     assert _reason(solution) == _name(Stop.converged)

@@ -34,9 +34,9 @@ def selection():
     stop = np.full((3, 4), "converged", dtype=object)
     stop[1, 3] = "too_many_steps"
     macxp = np.full((3, 4), 0.999)
-    steps = np.ones((3, 4), dtype=int)
+    steps, again = np.ones((3, 4), dtype=int), np.zeros((3, 4), dtype=int)
     problems = ("mode 1 at +0 mm", "mode 2 at +0 mm", "mode 3 at +0 mm")
-    runs = PartRuns(SPACE, np.arange(2), problems, searched, value, value, macxp, macxp, stop, steps)
+    runs = PartRuns(SPACE, np.arange(2), problems, searched, value, value, macxp, macxp, stop, steps, again)
     return select_stiffness(runs)
 
 

@@ -68,7 +68,7 @@ def more_modes(identification: MachineIdentification, count: int) -> ModesResidu
 
 
 def repeated(
-    identification: MachineIdentification, times: float, *, kinds: Sequence[str] | None = None
+    identification: MachineIdentification, times: float | int, *, kinds: Sequence[str] | None = None
 ) -> ModesResidual:
     """The same measurement again, so that there are several in all, with errors of their own.
 

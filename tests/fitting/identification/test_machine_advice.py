@@ -37,14 +37,16 @@ BELIEF = 0.03
 OUTPUTS = ("N6 x", "N6 y", "N6 z", "N16 x", "N12 y", "N8b z")
 PLACES, FURTHER = (-0.06, 0.33), -0.294
 COUNT = 8
-WEAK = "joints.mounting_2.viscous.x"
+WEAK = "joints.coupling.stiffness.rz"
+# Errors that are smaller than the weights say, so that estimates, which errors hang on, hardly differ.
+QUIET = {"frequency": 2e-4, "shape": 2e-3, "damping": 1e-2}
 
 
 @functools.cache
 def identified(places=PLACES, belief=BELIEF):
     """The nominal machine identified from noisy modes, started at itself; two quantities uncertain."""
     exact = [measured_modes(MACHINE, [z], count=COUNT, outputs=OUTPUTS)[0] for z in places]
-    references = [noisy([modes], seed)[0] for seed, modes in enumerate(exact)]
+    references = [noisy([modes], seed, **QUIET)[0] for seed, modes in enumerate(exact)]
     return identify_machine(MACHINE, references, places, SPACE, uncertain=UNCERTAIN, uncertainty=belief, start=MACHINE)
 
 
@@ -82,6 +84,7 @@ def test_now_is_what_the_fit_says():
     assert np.all(advice().predicted <= advice().known * (1 + 1e-9))
 
 
+@pytest.mark.slow
 def test_predictions_agree_with_information_by_finite_differences():
     """With what is believed of the uncertain quantities, which more measurements do not make more certain."""
     found, result = identified(), identified().fit
@@ -103,10 +106,11 @@ def believed():
     return np.asarray(space.values(MACHINE))[len(SPACE) :]
 
 
+@pytest.mark.slow
 def test_prediction_agrees_with_a_fit_with_the_data_added():
     added = identified((*PLACES, FURTHER)).fit
     predicted = advice().predicted[0]
-    np.testing.assert_allclose(predicted, added.standard_errors / added.values, rtol=0.06)
+    np.testing.assert_allclose(predicted, added.standard_errors / added.values, rtol=0.03)
     assert np.max(advice().known / predicted) > 1.2  # it does bring something
 
 
@@ -116,7 +120,7 @@ def test_a_kind_measured_more_often_helps_what_it_sees():
     gain = table["damping ratios measured five times"] / now
     dampings = [path for path in SPACE.paths if ".stiffness." not in path]
     np.testing.assert_allclose(gain[dampings], 1 / np.sqrt(5), rtol=0.02)
-    stiff = "joints.coupling.stiffness.rz"
+    stiff = "joints.guide.stiffness.rx"
     assert gain[stiff] > 0.99
     assert table["shapes measured five times"][stiff] < 0.9 * now[stiff]
 
@@ -130,7 +134,7 @@ def test_weak_ones_are_named_with_what_helps():
     assert "would bring it to" in found.sentences()[0]
     loose = helpful_measurements(identified(), [FURTHER], {}, limit=10.0)
     # Known to better than the limit, but not within its bounds: that it is not identified is said all the same.
-    assert set(loose.weak) <= {WEAK}
+    assert loose.weak == (WEAK,)
     assert loose.candidates == ("modes at z = -0.294 m",)
     assert WEAK in repr(found)
     assert WEAK in found._repr_html_()

@@ -11,6 +11,7 @@ from twin._checks import InputError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_WEAK, _KNOWN = "tab:orange", "0.75"
 _MARKS = ("o", "s", "D", "^", "v", "P", "X", "*")
 
 
@@ -32,6 +33,8 @@ def plot_advice(advice: MeasurementAdvice, ax: "Axes | None" = None, *, most: in
     Raises:
         InputError: most below one.
     """
+    from matplotlib.patches import Patch
+
     if most < 1:
         raise InputError(f"most must be at least 1, but is {most}.")
     order = np.argsort(-advice.known, kind="stable")[:most]
@@ -44,20 +47,16 @@ def plot_advice(advice: MeasurementAdvice, ax: "Axes | None" = None, *, most: in
     low, high = 100 * smallest / 2, 100 * largest * 2
     for row, i in enumerate(order):
         known = 100 * advice.known[i] if seen[i] else high
-        colour = "tab:orange" if advice.parameters[i] in weak else "0.75"
+        colour = _WEAK if advice.parameters[i] in weak else _KNOWN
         hatch = None if seen[i] else "//"
         ax.barh(row, known - low, left=low, height=0.7, color=colour, hatch=hatch, edgecolor="white", linewidth=0)
-    for colour, label in (("tab:orange", "now, known too weakly"), ("0.75", "now")):
-        ax.barh([], [], color=colour, label=label)
     drawn = {advice.parameters[i]: (row, i) for row, i in enumerate(order)}
     for k, name in enumerate(advice.candidates):
         rows = [drawn[path] for path in best if best[path] == name and path in drawn]
         if rows:
             after = [100 * advice.predicted[k, i] for _, i in rows]
             mark = _MARKS[k % len(_MARKS)]
-            ax.plot(
-                after, [row for row, _ in rows], mark, color=f"C{k}", mec="white", ms=7, ls="", label=f"with {name}"
-            )
+            ax.plot(after, [row for row, _ in rows], mark, color="0.1", mec="white", ms=7, ls="", label=f"with {name}")
     ax.axvline(100 * advice.limit, color="tab:red", lw=1.2, label=f"limit {100 * advice.limit:g} %")
     ax.set_xscale("log")
     ax.set_xlim(low, high)
@@ -65,7 +64,9 @@ def plot_advice(advice: MeasurementAdvice, ax: "Axes | None" = None, *, most: in
     ax.set_yticks(range(order.size), [_label(advice, int(i)) for i in order], fontsize="small")
     ax.set_ylim(order.size - 0.4, -0.6)
     ax.set_xlabel("relative standard error [%]")
-    ax.legend(fontsize="small", loc="lower right", framealpha=1.0)
+    shades = (("now, known too weakly", _WEAK), ("now", _KNOWN)) if weak else (("now", _KNOWN),)
+    handles = [Patch(color=colour, label=label) for label, colour in shades]
+    ax.legend(handles=handles + ax.get_legend_handles_labels()[0], fontsize="small", loc="lower right", framealpha=1.0)
     return ax
 
 

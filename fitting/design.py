@@ -83,17 +83,9 @@ def rank_experiments(result: FitResult, candidates: Mapping[str, AbstractResidua
     """
     if not candidates:
         raise InputError("Name at least one candidate experiment.")
-    space, vector = result.space, jnp.asarray(result.scaled)
-    information = []
-    for name, residual in candidates.items():
-        jacobian = np.asarray(linearised(Objective(residual, result.model, space), vector)[0])
-        priors = sum(p.prior is not None for p in space.parameters)
-        rows = jacobian[: len(jacobian) - priors]
-        if not np.all(np.isfinite(rows)):
-            raise InputError(
-                f"Candidate {name!r} has no finite Jacobian at the fit. Simulate it with the fitted model."
-            )
-        information.append(rows.T @ rows)
+    space = result.space
+    rows = {name: candidate_jacobian(result, name, residual) for name, residual in candidates.items()}
+    information = [jacobian.T @ jacobian for jacobian in rows.values()]
     known = result.factor.T @ result.factor / result.deviation**2 if np.all(np.isfinite(result.factor)) else 0.0
     known = known + np.diag(
         [1 / plausible_range(p, x) ** 2 for p, x in zip(space.parameters, result.scaled, strict=True)]
@@ -113,6 +105,28 @@ def rank_experiments(result: FitResult, candidates: Mapping[str, AbstractResidua
         standard_errors=spreads * np.abs(np.asarray(space.slopes(jnp.asarray(result.values)))),
         space=space,
     )
+
+
+def candidate_jacobian(result: FitResult, name: str, residual: AbstractResidual) -> np.ndarray:
+    """Jacobian of a candidate experiment in the scaled vector, at a fit: what it would add is JᵀJ.
+
+    Args:
+        result: the fit so far.
+        name: of the candidate, for messages.
+        residual: what it would give.
+
+    Returns:
+        The Jacobian (residuals, parameters).
+
+    Raises:
+        InputError: a Jacobian that is not finite.
+    """
+    jacobian, _ = linearised(Objective(residual, result.model, result.space), jnp.asarray(result.scaled))
+    priors = sum(p.prior is not None for p in result.space.parameters)
+    rows = np.asarray(jacobian)[: len(jacobian) - priors]
+    if not np.all(np.isfinite(rows)):
+        raise InputError(f"Candidate {name!r} has no finite Jacobian at the fit. Simulate it with the fitted model.")
+    return rows
 
 
 def _optimal_effort(known: np.ndarray, information: np.ndarray) -> np.ndarray:

@@ -14,7 +14,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def plot_deviations(deviation: Mapping[str, float], *, bins: int = 25, ax: "Axes | None" = None) -> "Axes":
+def plot_deviations(
+    deviation: Mapping[str, float],
+    *,
+    bins: int = 25,
+    limits: tuple[float, float] | None = None,
+    ax: "Axes | None" = None,
+) -> "Axes":
     """Histogram of the deviations of identified parameters, with median and 5th and 95th percentile.
 
     As figures 6 and 8 of J. Ellinger and M. F. Zaeh, Machines 10 (2022) 535. The largest deviation is named.
@@ -22,6 +28,7 @@ def plot_deviations(deviation: Mapping[str, float], *, bins: int = 25, ax: "Axes
     Args:
         deviation: relative deviation of each parameter, by name [%].
         bins: of the histogram.
+        limits: ends of the histogram [%]; those of the deviations if not given.
         ax: axes to draw in; new ones if not given.
 
     Raises:
@@ -34,7 +41,7 @@ def plot_deviations(deviation: Mapping[str, float], *, bins: int = 25, ax: "Axes
 
     ax = axes_or_new(ax, (4.6, 3.2))
     low, middle, high = np.percentile(values, (5, 50, 95))
-    ax.hist(values, bins=bins, color="0.75", edgecolor="0.35", lw=0.5)
+    ax.hist(values, bins=bins, range=limits, color="0.75", edgecolor="0.35", lw=0.5)
     ax.axvline(middle, color="C0", lw=1.4, label=f"median {middle:.2g} %")
     for at in (low, high):
         ax.axvline(
@@ -46,7 +53,7 @@ def plot_deviations(deviation: Mapping[str, float], *, bins: int = 25, ax: "Axes
     ax.set_ylabel("parameters")
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_ylim(0, 1.45 * ax.get_ylim()[1])  # room for the legend
-    ax.legend(fontsize="x-small", loc="upper left", ncols=1, frameon=False)
+    ax.legend(fontsize="x-small", loc="upper left", edgecolor="none", framealpha=0.9)
     return ax
 
 

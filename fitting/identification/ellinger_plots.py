@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 NAMES = {quantity.path: quantity.name for quantity in UNKNOWN}
 """Names of the unknowns, by path."""
-_LINEAR = (20.0, 120.0)
+_LINEAR = (105.0, 220.0)
 
 
 def draw_all(out: Path, ideal: Case, disturbed: Case) -> None:
@@ -89,11 +89,14 @@ def draw_deviations(case: Case) -> "np.ndarray":
     """
     axes = grid_or_new(None, 4, columns=2, panel=(4.4, 2.8))
     machines = {"published procedure": case.machines["published"], "then joint fit": case.machines["refined"]}
-    for row, (label, machine) in enumerate(machines.items()):
-        deviation = deviations(machine, case.truth)
-        for column, (kind, names) in enumerate((("stiffness", STIFFNESSES), ("damping", DAMPINGS))):
+    found = {label: deviations(machine, case.truth) for label, machine in machines.items()}
+    for column, (kind, names) in enumerate((("stiffness", STIFFNESSES), ("damping", DAMPINGS))):
+        # One scale for both rows: what the joint fit mends is seen.
+        both = [deviation[name] for deviation in found.values() for name in names]
+        limits = (min(both), max(both))
+        for row, (label, deviation) in enumerate(found.items()):
             ax = axes[2 * row + column]
-            plot_deviations({name: deviation[name] for name in names}, ax=ax)
+            plot_deviations({name: deviation[name] for name in names}, limits=limits, ax=ax)
             ax.set_title(f"{kind}, {label}", fontsize="medium")
     axes[0].figure.suptitle(_title(case))
     return axes

@@ -7,6 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
+from threadpoolctl import threadpool_limits
 
 from fitting.fit import fit
 from fitting.identifiability import IdentifiabilityReport, identifiability
@@ -52,6 +53,8 @@ class MachineIdentification(NamedTuple):
     """Joint fit of all parameters to frequencies, shapes and damping ratios."""
     unpaired: tuple[UnpairedMode, ...]
     """Measured modes that could not be paired."""
+    evidence: ModesResidual
+    """The measured modes with the weights that they had in the joint fit; zero for those not paired."""
 
     @property
     def seen(self) -> IdentifiabilityReport:
@@ -115,7 +118,8 @@ def identify_machine(
     def fitted(model: Machine, weight: np.ndarray) -> tuple[FitResult, np.ndarray]:
         weighted = eqx.tree_at(lambda d: d.weight, data, jnp.asarray(weight))
         everything = JointResidual((weighted, *prior), ("modes", "belief")[: 1 + len(prior)])
-        result = fit(everything, model, searched, max_steps=max_steps, variance="known")
+        with threadpool_limits(1, user_api="blas"):  # busy cores make small factorisations wait for each other
+            result = fit(everything, model, searched, max_steps=max_steps, variance="known")
         return result, np.asarray(_likeness(data, result.model))
 
     measured = np.asarray(data.weight)
@@ -131,7 +135,8 @@ def identify_machine(
         UnpairedMode(float(data.position[i]), int(j), float(data.frequency[i, j]), float(likeness[i, j]))
         for i, j in np.argwhere((measured > 0) & (weight == 0))
     )
-    return MachineIdentification(result.model, balanced, result, unpaired)
+    used = eqx.tree_at(lambda d: d.weight, data, jnp.asarray(weight))
+    return MachineIdentification(result.model, balanced, result, unpaired, used)
 
 
 def _believed(likeness: np.ndarray, measured: np.ndarray) -> np.ndarray:

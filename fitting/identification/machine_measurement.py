@@ -87,8 +87,9 @@ def modal_evidence(machine: Machine, references: Sequence[ReferenceModes], posit
         InputError: a position off a rail, an output that the machine does not have, whatever `ModesResidual` refuses.
     """
     residual = ModesResidual.of(references, list(_checked(machine, positions)))
+    known = machine.outputs
     for name in residual.outputs:
-        if name not in machine.outputs:
+        if name not in known:
             raise InputError(
                 f"The reference has an output {name!r} that the machine does not have. Name the rows as the machine's "
                 "nodes and directions, for instance 'N6 x'."

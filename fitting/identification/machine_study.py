@@ -1,12 +1,13 @@
 """The reference machine identified again and again: from exact modes, from noisy ones, and with a disturbed model."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from fitting.identifiability import IDENTIFIED
 from fitting.identification.conformity import ConformityStatistics, conformity
 from fitting.identification.machine import MachineIdentification, identify_machine
 from fitting.identification.machine_measurement import measured_modes, noisy, translations
@@ -17,6 +18,9 @@ from twin.parameters import ParameterSpace
 from twin.structure import Machine
 from twin.structure.reference_machine import POSITIONS, reference_machine
 from twin.structure.reference_quantities import DISTURBABLE, UNKNOWN, Quantity
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 IDENTIFICATION = POSITIONS[1:]
 """Positions z2 to z4, from which the machine is identified [m]; section 3.2."""
@@ -67,8 +71,12 @@ def random_truth(seed: int, *, stiffness: float = 0.2, damping: float = 2.0) -> 
         stiffness: largest deviation of a stiffness from its nominal value, as a share [-].
         damping: largest factor between a damping and its nominal value, either way [-].
     """
-    machine, space = reference_machine(), _space()
-    random = np.random.default_rng(seed)
+    return _truth(reference_machine(), seed, stiffness, damping)
+
+
+def _truth(machine: Machine, seed: int, stiffness: float = 0.2, damping: float = 2.0) -> Machine:
+    """`random_truth` around a machine that is at hand: to build one takes a tenth of a second."""
+    space, random = _space(machine), np.random.default_rng(seed)
     number = len(UNKNOWN)
     shares = np.where(
         _IS_STIFFNESS,
@@ -106,8 +114,9 @@ def identify_truth(
         uncertain: quantities of the model that are let go, see `identify_machine`.
         noise: seed of the measurement noise; none if not given.
     """
-    model = reference_machine() if model is None else model
-    space, truth = _space(), random_truth(seed)
+    nominal = reference_machine()
+    model = nominal if model is None else model
+    space, truth = _space(nominal), _truth(nominal, seed)
     references = measured_modes(truth, IDENTIFICATION)
     references = references if noise is None else noisy(references, noise)
     found = identify_machine(model, references, IDENTIFICATION, space, uncertain=uncertain)
@@ -117,12 +126,30 @@ def identify_truth(
 class Coverage(NamedTuple):
     """How often intervals of 95 % hold the truth."""
 
+    parameters: tuple[str, ...]
+    """Paths of the parameters."""
     share: np.ndarray
-    """Share of the repeats in which they do, by parameter [-]."""
+    """Share of the repeats in which they do, of those that identify the parameter; NaN where none does [-]."""
+    identified: np.ndarray
+    """Share of the repeats in which each parameter is reported as identified [-]."""
     error: np.ndarray
     """Median standard error, as a share of the value, by parameter [-]."""
     repeats: int
     """Number of repeats."""
+    failures: int
+    """Fits that did not converge or left out a mode; they count nowhere else."""
+
+    @property
+    def pooled(self) -> float:
+        """Share over all parameters together [-]."""
+        return float(np.nansum(self.share * self.identified) / np.sum(self.identified))
+
+    def to_dataframe(self) -> "pd.DataFrame":
+        """One row per parameter."""
+        import pandas as pd
+
+        columns = {"coverage": self.share, "identified": self.identified, "relative standard error": self.error}
+        return pd.DataFrame(columns, index=pd.Index(self.parameters, name="parameter"))
 
 
 def interval_coverage(seed: int, repeats: int = 50) -> Coverage:
@@ -131,13 +158,24 @@ def interval_coverage(seed: int, repeats: int = 50) -> Coverage:
     Args:
         seed: of the truth.
         repeats: number of measurements.
+
+    Raises:
+        RuntimeError: no fit converged.
     """
-    found = [identify_truth(seed, noise=number + 1) for number in range(repeats)]
-    intervals = np.stack([f.identification.fit.intervals() for f in found])
-    truth = found[0].truth
-    held = (intervals[..., 0] <= truth) & (truth <= intervals[..., 1])
-    errors = np.stack([f.identification.fit.standard_errors / f.found for f in found])
-    return Coverage(held.mean(axis=0), np.nanmedian(errors, axis=0), repeats)
+    model = reference_machine()
+    space, truth = _space(model), _truth(model, seed)
+    references = measured_modes(truth, IDENTIFICATION)
+    found = [identify_machine(model, noisy(references, number + 1), IDENTIFICATION, space) for number in range(repeats)]
+    good = [one for one in found if one.fit.success and not one.unpaired]
+    if not good:
+        raise RuntimeError(f"None of {repeats} fits converged with all modes paired.")
+    seen = np.asarray([[v.kind == IDENTIFIED for v in one.seen.verdicts] for one in good])
+    low, high = np.moveaxis(np.asarray([one.fit.intervals() for one in good]), -1, 0)
+    true = np.asarray(space.values(truth))
+    held = np.sum(seen & (low <= true) & (true <= high), axis=0)
+    errors = np.asarray([one.fit.standard_errors / one.fit.values for one in good])
+    share = np.divide(held, seen.sum(axis=0), out=np.full(len(space), np.nan), where=seen.any(axis=0))
+    return Coverage(space.paths, share, seen.mean(axis=0), np.nanmedian(errors, axis=0), repeats, repeats - len(good))
 
 
 def conformity_of(model: Machine, truth: Machine, positions: Sequence[float]) -> ConformityStatistics:
@@ -171,7 +209,7 @@ def permuted_damping(model: Machine, truth: Machine, seed: int = 1) -> Machine:
         truth: the machine that it was identified from.
         seed: of the permutation, in which no damping keeps its own.
     """
-    space = _space().subset([q.path for q in UNKNOWN if q.kind != "stiffness"])
+    space = _space(reference_machine()).subset([q.path for q in UNKNOWN if q.kind != "stiffness"])
     true = np.asarray(space.values(truth))
     shares = np.asarray(space.values(model)) / true
     random, order = np.random.default_rng(seed), np.arange(shares.size)
@@ -180,8 +218,8 @@ def permuted_damping(model: Machine, truth: Machine, seed: int = 1) -> Machine:
     return space.with_values(model, jnp.asarray(true * shares[order]))
 
 
-def _space() -> ParameterSpace:
-    return unknown_space(reference_machine(), scale="log")
+def _space(machine: Machine) -> ParameterSpace:
+    return unknown_space(machine, scale="log")
 
 
 @eqx.filter_jit

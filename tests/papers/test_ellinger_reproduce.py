@@ -80,7 +80,8 @@ def test_the_published_procedure_is_repeated_in_full(summary):
     assert summary["multistart"]["failed"] < 300
     selected = summary["ideal"]["paper_selection"]
     # As in the paper most stiffnesses come out well and a few do not; the joint fit mends all.
-    assert selected["published"]["stiffness_median"] < 3.0 < 100 * selected["published"]["stiffness_worst"]
+    assert selected["published"]["stiffness_median"] < 3.0
+    assert selected["published"]["stiffness_worst"] > 1.0
     assert selected["refined"]["stiffness_worst"] < 0.1
     assert selected["refined"]["damping_worst"] < 1.0
 

@@ -16,6 +16,7 @@ from fitting.identification.conformity import ConformityStatistics
 from fitting.identification.machine import MachineIdentification, identify_machine
 from fitting.identification.machine_measurement import measured_modes
 from fitting.identification.machine_procedure import ByRule, GuidedIdentification, choose, identify_by_parts
+from fitting.identification.machine_screening import MachineScreening, screen_machine
 from fitting.identification.machine_selection import ROBUST
 from fitting.identification.machine_study import (
     DISTURBED,
@@ -60,6 +61,10 @@ class Case(NamedTuple):
     """The machine that is identified."""
     references: tuple[ReferenceModes, ...]
     """Modes of the truth at z2 to z4."""
+    screening: MachineScreening
+    """Bounds on the total effects, before the procedure."""
+    screening_seconds: float
+    """Time of the screening, compilation included [s]."""
     guided: GuidedIdentification
     """The procedure as published."""
     robust: ByRule
@@ -112,9 +117,11 @@ def study_case(
     model = disturbed_machine(seed) if disturbed else reference_machine()
     references = measured_modes(truth, IDENTIFICATION)
     nominal = reference_machine()
-    guided = identify_by_parts(
-        model, references, IDENTIFICATION, unknown_space(nominal), seed=seed + 1, n=n, starts=starts
-    )
+    space = unknown_space(nominal)
+    clock = time.perf_counter()
+    screening = screen_machine(model, references, IDENTIFICATION, space, seed=seed + 1)
+    screening_seconds = time.perf_counter() - clock
+    guided = identify_by_parts(model, references, IDENTIFICATION, space, seed=seed + 1, n=n, starts=starts)
     # With stiffnesses that are right, more equations mean better dampings.
     robust = choose(
         model, references, IDENTIFICATION, guided.runs, guided.sensitivity, rule=ROBUST, equations=None, least=0.0
@@ -128,9 +135,21 @@ def study_case(
         uncertain=uncertain if disturbed else (),
         start=robust.machine,
     )
-    seconds = time.perf_counter() - clock
+    refinement_seconds = time.perf_counter() - clock
     name = DISTURBED_MODEL if disturbed else IDEAL
-    return Case(name, seed, truth, model, references, guided, robust, refined, seconds)
+    return Case(
+        name,
+        seed,
+        truth,
+        model,
+        references,
+        screening,
+        screening_seconds,
+        guided,
+        robust,
+        refined,
+        refinement_seconds,
+    )
 
 
 def deviations(machine: Machine, truth: Machine) -> dict[str, float]:

@@ -9,6 +9,7 @@ import numpy as np
 from fitting.identification.conformity import ConformityStatistics
 from fitting.identification.ellinger_published import DEVIATIONS, SECONDS, TABLES
 from fitting.identification.ellinger_study import DISTURBED_MODEL, IDEAL, Case, Repeat, Tables, deviations
+from fitting.identification.machine_sensitivity import SHAPE
 from twin.structure.reference_quantities import UNKNOWN
 
 if TYPE_CHECKING:
@@ -108,6 +109,7 @@ def summarise(cases: Mapping[str, Case], parts: Mapping[str, dict[str, Any]]) ->
             "analyses": len(case.guided.sensitivity.indices.outputs),
             "seconds": case.guided.seconds.sensitivity,
             "searched_per_problem": runs.searched.sum(axis=1).tolist(),
+            "screening": _screened(case),
         },
         "multistart": {
             "solves": int(runs.failed.size),
@@ -139,7 +141,7 @@ def text_of(summary: dict[str, Any]) -> str:
         z1 = [one["validation"] for one in by_truth]
         lines.append(
             f"  held-back z1: MACXP worst {min(one['macxp_worst'] for one in z1):.2f}, FRAC worst "
-            f"{min(one['frac_worst'] for one in z1):.2f}, FRAC mean {min(one['frac_mean'] for one in z1):.2f} "
+            f"{min(one['frac_worst'] for one in z1):.2f}, FRAC mean {min(one['frac_mean'] for one in z1):.2f}"
         )
         chosen = part["paper_selection"]
         lines.append(f"  truth {chosen['truth']} by the published procedure, then jointly:")
@@ -150,6 +152,13 @@ def text_of(summary: dict[str, Any]) -> str:
                 f"({one['stiffness_worst_name']}); damping median {one['damping_median']:.2g}, worst "
                 f"{one['damping_worst']:.2g} ({one['damping_worst_name']})"
             )
+    screening = summary["gsa"]["screening"]
+    largest = 100 * screening["largest_total_effect_cleared"]
+    lines.append(
+        f"Screening by derivatives, {screening['samples']} samples in {screening['seconds']:.1f} s: clears "
+        f"{screening['cleared']} of {screening['pairs']} pairs of mode and stiffness; largest total effect among them "
+        f"{largest:.1g} %"
+    )
     gsa, solves, study = summary["gsa"], summary["multistart"], summary["study"]
     lines.append(
         f"{gsa['analyses']} sensitivity analyses at N = {gsa['n']} in {gsa['seconds']:.1f} s, {solves['solves']} "
@@ -158,6 +167,21 @@ def text_of(summary: dict[str, Any]) -> str:
         f"(paper: {sum(study['paper_seconds_on_40_cores'].values()) / 60:.0f} min on 40 cores)"
     )
     return "\n".join(lines)
+
+
+def _screened(case: Case) -> dict[str, Any]:
+    """What derivatives clear before the Sobol study: pairs of a mode's MACXP and a stiffness."""
+    cleared = ~case.screening.matters()[:, case.guided.runs.stiffness]
+    total = case.guided.sensitivity.total(SHAPE)[:, case.guided.runs.stiffness]
+    return {
+        "samples": int(case.screening.measures.n),
+        "seconds": case.screening_seconds,
+        "pairs": int(cleared.size),
+        "cleared": int(cleared.sum()),
+        "below_1_percent_by_sobol": int(np.sum(total <= 0.01)),
+        "largest_total_effect_cleared": float(np.max(total[cleared], initial=0.0)),
+        "left_out_of_all": list(case.screening.left_out),
+    }
 
 
 def _by_truth(one: Repeat) -> dict[str, Any]:

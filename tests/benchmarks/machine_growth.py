@@ -19,7 +19,7 @@ from twin.parameters import ParameterSpace
 from twin.structure import Machine
 from twin.structure.component import Component
 from twin.structure.rail import Rail
-from twin.structure.reference_machine import MODES, reference_machine
+from twin.structure.reference_machine import reference_machine
 
 
 class Sizes(NamedTuple):
@@ -37,10 +37,10 @@ class Sizes(NamedTuple):
     """Stiffnesses searched where others grow."""
     runs: int = 16
     """Starts where others grow."""
-    modes: int = MODES
+    modes: int = 10
     """Reference modes, each with a small problem."""
     rounds: int = 2
-    """Turns of timing after one to compile; the shortest counts."""
+    """Turns of timing; the shortest counts."""
 
 
 class Growth(NamedTuple):
@@ -78,7 +78,7 @@ def all_growth(seed: int, sizes: Sizes | None = None) -> list[Growth]:
         def evaluate(part=part, one=one, samples=samples) -> None:
             mode_outputs([part], [one], samples)
 
-        modes.append(shortest(evaluate, sizes.rounds) / rows)
+        modes.append(shortest(evaluate, evaluate, sizes.rounds) / rows)
         solves.append(_per_solve(machine, references, space, mask, seed, sizes.runs, sizes.rounds))
     found = [
         Growth("modes of one sample, against coordinates kept", sizes.coordinates, tuple(modes)),
@@ -103,21 +103,21 @@ def all_growth(seed: int, sizes: Sizes | None = None) -> list[Growth]:
     studies = []
     for n in sizes.points:
 
-        def study_of(n=n) -> None:
+        def study_of(n: int = n) -> None:
             machine_sensitivity(machine, references, IDENTIFICATION, space, seed=seed, n=n)
 
-        studies.append(shortest(study_of, sizes.rounds))
+        studies.append(shortest(lambda: study_of(8), study_of, sizes.rounds))
     found.append(Growth("sensitivity study at three positions, against N", sizes.points, tuple(studies)))
     return found
 
 
-def shortest(function: Callable[[], None], rounds: int) -> float:
-    """Shortest time of a call after one that compiles [s]."""
-    function()
+def shortest(small: Callable[[], None], whole: Callable[[], None], rounds: int) -> float:
+    """Shortest time of a call after a small one that compiles [s]."""
+    small()
     times = []
     for _ in range(rounds):
         clock = time.perf_counter()
-        function()
+        whole()
         times.append(time.perf_counter() - clock)
     return min(times)
 
@@ -184,10 +184,10 @@ def _per_solve(
     starts: int,
     rounds: int,
 ) -> float:
-    def solves() -> None:
-        solve_parts(machine, references, IDENTIFICATION[:1], space, mask, seed=seed, starts=starts)
+    def solves(runs: int = starts) -> None:
+        solve_parts(machine, references, IDENTIFICATION[:1], space, mask, seed=seed, starts=runs)
 
-    return shortest(solves, rounds) / (starts * len(mask))
+    return shortest(lambda: solves(2), solves, rounds) / (starts * len(mask))
 
 
 def as_markdown(rows: list[Growth]) -> str:

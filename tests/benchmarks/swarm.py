@@ -18,11 +18,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from fitting.fit import fit
 from fitting.multistart import multistart
 from fitting.objective import Objective
 from fitting.residuals.load_surface import LoadSurfaceResidual, total_over_contacts
+from fitting.solve import Solver
 from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt
 from fitting.solvers.slsqp import SLSQP
+from fitting.starts import sample_starts
 from tests.benchmarks.drive_case import drive_case, space_around
 from tests.benchmarks.frequency_case import frequency_case
 from tests.benchmarks.swarm_cases import (
@@ -93,20 +96,16 @@ def swarm_ledger(
     rows = []
     for name, make in (problems() if made is None else made).items():
         problem = make()
-        residual, model, space = problem[:3]
         found = []
         for solver in (BoundedLevenbergMarquardt(), SLSQP()):
             for starts in (1, problem.starts):  # the first compiles
                 clock = time.perf_counter()
-                result = multistart(
-                    residual, model, space, starts=starts, solver=solver, max_steps=problem.max_steps, width=8
-                )
+                steps, costs = _fits(problem, solver, starts)
                 seconds = time.perf_counter() - clock
-            paid = int((result.steps + 1).sum()) * (len(space) + 1)
+            paid = int((steps + 1).sum()) * (len(problem.space) + 1)
             method = f"{type(solver).__name__}, {problem.starts} starts"
-            found.append(
-                (method, paid, seconds, float(np.min(result.costs, where=~np.isnan(result.costs), initial=np.inf)))
-            )
+            best = float(np.min(costs, where=~np.isnan(costs), initial=np.inf))
+            found.append((method, paid, seconds, best))
         if problem.informed is not None:
             problem.informed()
             clock = time.perf_counter()
@@ -116,6 +115,18 @@ def swarm_ledger(
         rows += [Ledger(name, method, paid, seconds, cost <= target) for method, paid, seconds, cost in found]
         rows.append(_swarm(name, problem, target, particles, seed))
     return rows
+
+
+def _fits(problem: SwarmProblem, solver: Solver, starts: int) -> tuple[np.ndarray, np.ndarray]:
+    """Steps and costs of fits from random starts."""
+    residual, model, space = problem[:3]
+    options = {"solver": solver, "max_steps": problem.max_steps}
+    if problem.batched:
+        result = multistart(residual, model, space, starts=starts, width=problem.width, **options)
+        return result.steps, result.costs
+    begins = (space.unpack(model, jnp.asarray(vector)) for vector in sample_starts(space, starts))
+    results = [fit(residual, begin, space, **options) for begin in begins]
+    return np.asarray([r.steps for r in results]), np.asarray([r.cost for r in results])
 
 
 class _Reached(Exception):
@@ -137,7 +148,8 @@ def _pyswarms() -> Iterator[Any]:
 def _swarm(name: str, problem: SwarmProblem, target: float, particles: int, seed: int) -> Ledger:
     residual, model, space = problem[:3]
     objective = Objective(residual, model, space)
-    costs = jax.jit(lambda o, x: jax.vmap(lambda v: 0.5 * jnp.sum(o(v)[0] ** 2))(x))
+    batch = jax.vmap if problem.batched else lambda cost: lambda x: jax.lax.map(cost, x)
+    costs = jax.jit(lambda o, x: batch(lambda v: 0.5 * jnp.sum(o(v)[0] ** 2))(x))
     bounds = (np.asarray(space.lower), np.asarray(space.upper))
     costs(objective, jnp.asarray(np.tile(bounds[0], (particles, 1)))).block_until_ready()
     paid = 0

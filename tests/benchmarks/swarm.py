@@ -18,21 +18,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from fitting.fit import fit
 from fitting.multistart import multistart
 from fitting.objective import Objective
 from fitting.residuals.load_surface import LoadSurfaceResidual, total_over_contacts
 from fitting.solve import Solver
 from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt
 from fitting.solvers.slsqp import SLSQP
-from fitting.starts import sample_starts
 from tests.benchmarks.drive_case import drive_case, space_around
 from tests.benchmarks.frequency_case import frequency_case
 from tests.benchmarks.swarm_cases import (
     SwarmProblem,
-    ellinger_joint_problem,
     ellinger_small_problem,
-    mauro_problem,
 )
 from twin.laws import AbstractLoadLaw, HyperbolicDamping, RootStiffness
 
@@ -77,9 +73,7 @@ def problems() -> dict[str, Callable[[], SwarmProblem]]:
         "Leipe damping (3)": lambda: _surface(damping, {"d1": "N^2 s/m", "d2": "N", "d3": "N s/m"}, 0.0451),
         "drive record (8)": lambda: fit_of(drive_case(200)),
         "drive's frequency responses (8)": lambda: fit_of(frequency_case()),
-        "Mauro's Table 1, five rows a simulation (5)": mauro_problem,
         "Ellinger, one mode's 1 - MACXP (5)": ellinger_small_problem,
-        "Ellinger, all modes together (27)": ellinger_joint_problem,
     }
 
 
@@ -106,11 +100,6 @@ def swarm_ledger(
             method = f"{type(solver).__name__}, {problem.starts} starts"
             best = float(np.min(costs, where=~np.isnan(costs), initial=np.inf))
             found.append((method, paid, seconds, best))
-        if problem.informed is not None:
-            problem.informed()
-            clock = time.perf_counter()
-            method, paid, cost = problem.informed()
-            found.append((method, paid, time.perf_counter() - clock, cost))
         target = CLOSE * min(cost for *_, cost in found) + problem.slack
         rows += [Ledger(name, method, paid, seconds, cost <= target) for method, paid, seconds, cost in found]
         rows.append(_swarm(name, problem, target, particles, seed))
@@ -119,14 +108,8 @@ def swarm_ledger(
 
 def _fits(problem: SwarmProblem, solver: Solver, starts: int) -> tuple[np.ndarray, np.ndarray]:
     """Steps and costs of fits from random starts."""
-    residual, model, space = problem[:3]
-    options = {"solver": solver, "max_steps": problem.max_steps}
-    if problem.batched:
-        result = multistart(residual, model, space, starts=starts, width=problem.width, **options)
-        return result.steps, result.costs
-    begins = (space.unpack(model, jnp.asarray(vector)) for vector in sample_starts(space, starts))
-    results = [fit(residual, begin, space, **options) for begin in begins]
-    return np.asarray([r.steps for r in results]), np.asarray([r.cost for r in results])
+    result = multistart(*problem[:3], starts=starts, solver=solver, max_steps=problem.max_steps, width=8)
+    return result.steps, result.costs
 
 
 class _Reached(Exception):
@@ -148,8 +131,7 @@ def _pyswarms() -> Iterator[Any]:
 def _swarm(name: str, problem: SwarmProblem, target: float, particles: int, seed: int) -> Ledger:
     residual, model, space = problem[:3]
     objective = Objective(residual, model, space)
-    batch = jax.vmap if problem.batched else lambda cost: lambda x: jax.lax.map(cost, x)
-    costs = jax.jit(lambda o, x: batch(lambda v: 0.5 * jnp.sum(o(v)[0] ** 2))(x))
+    costs = jax.jit(lambda o, x: jax.vmap(lambda v: 0.5 * jnp.sum(o(v)[0] ** 2))(x))
     bounds = (np.asarray(space.lower), np.asarray(space.upper))
     costs(objective, jnp.asarray(np.tile(bounds[0], (particles, 1)))).block_until_ready()
     paid = 0

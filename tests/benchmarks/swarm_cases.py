@@ -1,6 +1,5 @@
-"""Problems of papers that the swarm ledger runs: Table 1 of Mauro et al., and the machine of Ellinger and Zaeh."""
+"""Problems of the swarm ledger, and the one that Ellinger and Zaeh solve 6,000 times."""
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -9,25 +8,18 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitting.identification import machine_parts
-from fitting.identification.machine import identify_machine
 from fitting.identification.machine_affine import affine_machine
 from fitting.identification.machine_evidence import evidence
 from fitting.identification.machine_likeness import PartData, Shares, Unlikeness
-from fitting.identification.machine_measurement import measured_modes, modal_evidence, noisy
+from fitting.identification.machine_measurement import measured_modes
 from fitting.identification.machine_sensitivity import machine_sensitivity
 from fitting.identification.machine_study import IDENTIFICATION, random_truth
 from fitting.identification.machine_unknowns import unknown_space
-from fitting.identification.mauro_residual import TableResidual
-from fitting.identification.mauro_table import MauroTable, mauro_table
-from fitting.identification.mauro_twin import table_space, table_twin
 from fitting.residuals.residual import AbstractResidual
 from tests.benchmarks.machine_growth import most_effective
 from twin.parameters import Parameter, ParameterSpace
 from twin.structure.reference_machine import reference_machine
 
-MAURO = ("velocity", "torque_constant", "distance", "resistance", "breakaway")
-"""Parameters of the twin behind Table 1 that it determines best, by columns of the Jacobian with pivots."""
-_REACH = 1.3
 SMALL = 5
 """Stiffnesses of the small problem of the machine."""
 
@@ -46,12 +38,6 @@ class SwarmProblem(NamedTuple):
     """Of a gradient method from one start."""
     iterations: int = 400
     """Of the swarm, at most."""
-    width: int = 8
-    """Fits in step."""
-    batched: bool = True
-    """Whether many are evaluated at once; one by one where LAPACK is called, which batches on two cores can wait in."""
-    informed: Callable[[], tuple[str, int, float]] | None = None
-    """Another method, that needs no start: name, simulations paid, cost reached."""
 
 
 class Repeated(AbstractResidual):
@@ -64,20 +50,6 @@ class Repeated(AbstractResidual):
 
     def __call__(self, model: Any) -> Float[Array, "residuals"]:
         return jnp.tile(self.residual(model) / jnp.sqrt(1.0 * self.times), self.times)
-
-
-def mauro_problem() -> SwarmProblem:
-    """The fit of the twin to every fourth row of Table 1, each parameter within a factor of the full fit's value."""
-    rows = MauroTable(*(column[::4] for column in mauro_table()))
-    twin, free = table_twin(), table_space().subset(MAURO)
-    values = np.asarray(free.values(twin))
-    space = ParameterSpace(
-        [
-            Parameter(p.path, p.unit, value / _REACH, value * _REACH, scale="log")
-            for p, value in zip(free.parameters, values.tolist(), strict=True)
-        ]
-    )
-    return SwarmProblem(TableResidual.of(rows), twin, space, starts=2, max_steps=15, iterations=25, width=2)
 
 
 def ellinger_small_problem(seed: int = 1, mode: int = 7) -> SwarmProblem:
@@ -101,17 +73,3 @@ def ellinger_small_problem(seed: int = 1, mode: int = 7) -> SwarmProblem:
     free = ParameterSpace([Parameter(f"share.{i}", "", 0.0, 1.0, size=1.0) for i in range(SMALL)])
     residual = Repeated(Unlikeness(PartData(*(jnp.asarray(leaf[0]) for leaf in leaves))), SMALL)
     return SwarmProblem(residual, Shares(jnp.full(SMALL, 0.5)), free, slack=1e-6)
-
-
-def ellinger_joint_problem(seed: int = 1) -> SwarmProblem:
-    """All 27 parameters from noisy frequencies, shapes and damping ratios of 20 modes at three positions."""
-    model, space = reference_machine(), unknown_space(reference_machine(), scale="log")
-    references = noisy(measured_modes(random_truth(seed), IDENTIFICATION), seed)
-    residual = modal_evidence(model, references, IDENTIFICATION)
-
-    def informed() -> tuple[str, int, float]:
-        found = identify_machine(model, references, IDENTIFICATION, space)
-        paid = (found.fit.steps + 1) * (len(space) + 1) + (found.start.evaluations if found.start else 0)
-        return "balance of forces, then LM", paid, found.fit.cost
-
-    return SwarmProblem(residual, model, space, starts=2, max_steps=60, iterations=50, batched=False, informed=informed)

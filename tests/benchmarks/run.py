@@ -13,12 +13,12 @@ import jax
 
 from twin._loop_option import make_small_loops_one_function
 
-SECTIONS = ("simulation", "rack_pinion", "programmes", "multistart", "swarm")
+SECTIONS = ("simulation", "rack_pinion", "programmes", "multistart", "swarm", "machine")
 
 
 def main() -> None:
     """Run, print, write."""
-    parser = argparse.ArgumentParser(description="The twin against SciPy and CasADi, as ratios in one run.")
+    parser = argparse.ArgumentParser(description="The twin against SciPy, SALib and CasADi, as ratios in one run.")
     parser.add_argument("--out", type=Path, required=True, help="folder for benchmarks.json and benchmarks.md")
     parser.add_argument("--ticks", type=int, default=2000, help="length of the stretch on which all entrants run")
     parser.add_argument("--rounds", type=int, default=2, help="turns of timing")
@@ -31,9 +31,10 @@ def main() -> None:
     make_small_loops_one_function()
     jax.config.update("jax_enable_x64", True)
     # Imported late: these modules make arrays.
-    from tests.benchmarks import multistart, programmes, rack_pinion, rack_report, swarm
+    from tests.benchmarks import machine_report, multistart, programmes, rack_pinion, rack_report, swarm
     from tests.benchmarks.emps_case import dahl_case, rigid_case
     from tests.benchmarks.emps_simulation import compare, compare_best
+    from tests.benchmarks.machine import machine_benchmark
     from tests.benchmarks.report import as_dictionary, as_markdown, machine
 
     comparisons = []
@@ -63,6 +64,10 @@ def main() -> None:
         ledger = swarm.swarm_ledger()
         text += swarm.as_markdown(ledger) + "\n"
         results["swarm"] = swarm.as_dictionary(ledger)
+    if "machine" in options.sections:
+        found = machine_benchmark()
+        text += machine_report.as_markdown(found) + "\n"
+        results["machine"] = machine_report.as_dictionary(found)
 
     about = machine()
     text = as_markdown(comparisons, about).replace("## Machine", text + "## Machine")

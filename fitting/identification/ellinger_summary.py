@@ -45,9 +45,9 @@ def printed_beside(case: str, tables: Mapping[str, Tables]) -> "dict[int, pd.Dat
     for where in ("identification", "validation"):
         columns = {}
         for measure, printed in TABLES[case, where].items():
-            columns[f"{measure.upper()} paper"] = list(dataclasses.asdict(printed).values())
+            columns[measure.upper(), "paper"] = list(dataclasses.asdict(printed).values())
             for name, table in tables.items():
-                columns[f"{measure.upper()} {name}"] = list(getattr(table, where).to_dict()[measure].values())
+                columns[measure.upper(), name] = list(getattr(table, where).to_dict()[measure].values())
         rows = pd.Index(["worst", "5 % percentile", "mean", "median"], name="%")
         found[_NUMBERS[case, where]] = pd.DataFrame(columns, index=rows)
     return found

@@ -1,5 +1,6 @@
 """Pictures of a machine's identification: what is drawn, in the axes given."""
 
+import jax.numpy as jnp
 import matplotlib
 import matplotlib.pyplot
 import numpy as np
@@ -70,7 +71,13 @@ def test_a_histogram_of_nothing_is_refused(bad):
 
 def test_responses_lie_over_each_other_with_an_inset():
     frequency = np.linspace(10.0, 100.0, 50)
-    reference = FRF(frequency, (1e-8 / (1 + 0.02j * frequency))[None, None], ("N6 x",), ("N6 x",), "receptance")
+    reference = FRF(
+        jnp.asarray(frequency),
+        jnp.asarray((1e-8 / (1 + 0.02j * frequency))[None, None]),
+        ("N6 x",),
+        ("N6 x",),
+        "receptance",
+    )
     ax = plot_conformity(reference, {"identified": reference}, "N6 x", "N6 x", linear=(20.0, 60.0))
     assert ax.get_yscale() == "log"
     (inset,) = ax.child_axes

@@ -11,6 +11,7 @@ from fitting.json_file import write_json
 from fitting.result import FitResult
 from twin.io.parameter_file import ParameterEntry, write_parameters
 
+# The truth whose published identification is shown; any would do.
 _TRUTH = 3
 
 

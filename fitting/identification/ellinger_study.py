@@ -64,7 +64,7 @@ class Case(NamedTuple):
     screening: MachineScreening
     """Bounds on the total effects, before the procedure."""
     screening_seconds: float
-    """Time of the screening, compilation included [s]."""
+    """Time of the screening, with compilation where the process had not compiled it before [s]."""
     guided: GuidedIdentification
     """The procedure as published."""
     robust: ByRule
@@ -72,7 +72,7 @@ class Case(NamedTuple):
     refined: MachineIdentification
     """The joint fit, started from the robust rule's machine."""
     refinement_seconds: float
-    """Time of the joint fit, compilation included [s]."""
+    """Time of the joint fit, with compilation where the process had not compiled it before [s]."""
 
     @property
     def machines(self) -> dict[str, Machine]:
@@ -107,7 +107,7 @@ def study_case(
     """Identify one random truth as published, by the robust rule, and by a joint fit.
 
     Args:
-        seed: of the truth, the disturbance, samples and starts.
+        seed: of the truth and the disturbance; samples and starts take the next one.
         disturbed: whether other quantities of the model are wrong.
         uncertain: what the joint fit lets go if so.
         n: base points of the sensitivity study.

@@ -73,8 +73,7 @@ def force_balance(
 
     Args:
         machine: start; what is not in the space stays as it is.
-        references: measured modes at each position; frequencies and mass-normalised real shapes are used. A mode that
-            is NaN is left out.
+        references: measured modes at each position; frequencies and mass-normalised real shapes are used.
         positions: axis positions [m].
         space: stiffnesses of joints, on a logarithmic scale, with bounds.
         force_deviation: σ_e, standard deviation of the weighed forces of a shape of unit modal mass [-]. Without noise
@@ -93,7 +92,11 @@ def force_balance(
     32 (1994) 1485-1491, for the idea; L. Kaufman, BIT 15 (1975) 49-57, for the derivative.
     """
     if any(parameter.scale != "log" for parameter in space.parameters):
-        raise InputError("force_balance needs stiffnesses on a logarithmic scale: Parameter(..., scale='log').")
+        name = next(parameter.path for parameter in space.parameters if parameter.scale != "log")
+        raise InputError(
+            f"{name!r} is on a linear scale, but the balance of forces needs stiffnesses on a logarithmic one: "
+            "Parameter(..., scale='log')."
+        )
     start = np.asarray(space.pack(machine))
     data = [_position(machine, r, z, space) for r, z in zip(references, positions, strict=True)]
     kept: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}

@@ -1,5 +1,6 @@
 """Stiffnesses and dampings of a machine from its measured modes, with their uncertainty."""
 
+import warnings
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -18,7 +19,7 @@ from fitting.residuals.modes import ModesResidual
 from fitting.residuals.prior import GaussianPrior
 from fitting.residuals.residual import JointResidual
 from fitting.result import FitResult
-from twin._checks import above_zero
+from twin._checks import InputError, above_zero
 from twin.modal import ReferenceModes
 from twin.parameters import ParameterSpace
 from twin.structure import Machine
@@ -27,6 +28,9 @@ from twin.structure.reference_quantities import Quantity
 # Least likeness of a pair of modes that is believed: by MACXP with 20 % of damping, nearly the MAC.
 _LIKE = 0.5
 _ROUNDS = 3
+# Share of the measured modes that must be paired for the result to be believed.
+_ENOUGH = 0.5
+_UNLIKE = "The machine is too unlike the measurement: are frequencies in Hz, positions in m, rows named by its nodes?"
 
 
 class UnpairedMode(NamedTuple):
@@ -55,6 +59,33 @@ class MachineIdentification(NamedTuple):
     """Measured modes that could not be paired."""
     evidence: ModesResidual
     """The measured modes with the weights that they had in the joint fit; zero for those not paired."""
+
+    @property
+    def success(self) -> bool:
+        """Whether the fit converged, and on at least half of the measured modes."""
+        return self.fit.success and self._paired >= _ENOUGH * self._measured
+
+    @property
+    def message(self) -> str:
+        """How many modes were paired, and why the fit ended."""
+        found = f"{self._paired} of {self._measured} measured modes are paired with modes of the machine."
+        if self._paired < _ENOUGH * self._measured:
+            found += f" {_UNLIKE}"
+        return f"{found} {self.fit.message}"
+
+    @property
+    def _paired(self) -> int:
+        return int(np.count_nonzero(np.asarray(self.evidence.weight) > 0))
+
+    @property
+    def _measured(self) -> int:
+        return self._paired + len(self.unpaired)
+
+    def __repr__(self) -> str:
+        return f"{self.fit!r}\n{self.message}"
+
+    def _repr_html_(self) -> str:
+        return f"{self.fit._repr_html_()}<p>{self.message}</p>"
 
     @property
     def seen(self) -> IdentifiabilityReport:
@@ -98,8 +129,12 @@ def identify_machine(
         The identified machine. Standard errors hold for weights that are exact.
 
     Raises:
-        InputError: a position off a rail, an output that the machine does not have, a parameter that is no stiffness
-            of a joint where one must be, whatever `fit` refuses.
+        InputError: a position off a rail or twice, an output that the machine does not have, a parameter that is no
+            stiffness of a joint where one must be, no measured mode that a mode of the machine is like, whatever `fit`
+            refuses.
+
+    Warns:
+        UserWarning: more than half of the measured modes could not be paired.
     """
     above_zero("uncertainty", uncertainty, "-")
     data = modal_evidence(machine, references, positions) if residual is None else residual
@@ -124,6 +159,8 @@ def identify_machine(
 
     measured = np.asarray(data.weight)
     weight = _believed(np.asarray(_likeness(data, model)), measured)
+    if not weight.any():
+        raise InputError(f"No mode of the machine is like any of the {np.count_nonzero(measured)} measured. {_UNLIKE}")
     result, likeness = fitted(model, weight)
     for _ in range(_ROUNDS):
         again = _believed(likeness, measured)
@@ -136,7 +173,10 @@ def identify_machine(
         for i, j in np.argwhere((measured > 0) & (weight == 0))
     )
     used = eqx.tree_at(lambda d: d.weight, data, jnp.asarray(weight))
-    return MachineIdentification(result.model, balanced, result, unpaired, used)
+    found = MachineIdentification(result.model, balanced, result, unpaired, used)
+    if 2 * len(unpaired) > np.count_nonzero(measured):
+        warnings.warn(found.message, stacklevel=2)
+    return found
 
 
 def _believed(likeness: np.ndarray, measured: np.ndarray) -> np.ndarray:

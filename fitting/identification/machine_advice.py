@@ -140,12 +140,12 @@ def helpful_measurements(
         The advice.
 
     Raises:
-        InputError: a limit that is not positive, a position off a rail or measured already, no candidate at all, a fit
-            or a candidate without a finite Jacobian.
+        InputError: a limit that is no share between 0 and 1, a position off a rail or measured already, no candidate at
+            all, a fit or a candidate without a finite Jacobian.
     """
     single_number("limit", limit)
-    if not (np.isfinite(limit) and limit > 0):
-        raise InputError(f"limit must be a positive share, such as 0.1, but is {limit}.")
+    if not 0 < limit < 1:
+        raise InputError(f"limit must be a share between 0 and 1, such as 0.1 for 10 %, but is {limit}.")
     result = identification.fit
     if not np.all(np.isfinite(result.factor)):
         raise InputError("This fit has no finite Jacobian, so nothing can be predicted. " + result.message)

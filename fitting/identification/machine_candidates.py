@@ -8,13 +8,16 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
+import equinox as eqx
 import numpy as np
+from jaxtyping import Array
 
 from fitting.identification.machine import MachineIdentification
 from fitting.identification.machine_measurement import measured_modes
 from fitting.residuals.modes import KINDS, ModesResidual
 from twin._checks import InputError
 from twin.modal import reference_modes
+from twin.structure import Machine
 
 _NAMES = {"frequency": "frequencies", "shape": "shapes", "damping": "damping ratios"}
 _COUNTS = {2: "twice", 3: "three times", 4: "four times", 5: "five times"}
@@ -45,25 +48,25 @@ def modes_at(identification: MachineIdentification, position: float, *, count: i
 
 
 def more_modes(identification: MachineIdentification, count: int) -> ModesResidual:
-    """Further modes, next in frequency, at the positions measured.
+    """Further modes at the positions measured: those of the machine's first that have no measured mode of theirs.
 
     Args:
         identification: what is known so far.
-        count: number of modes at each position then, those measured included.
+        count: number of the machine's modes that are then measured at each position, from the lowest.
 
     Returns:
         The evidence to expect of the further ones.
 
     Raises:
-        InputError: no more modes than are measured, or more than the machine has.
+        InputError: no mode among them that is not measured, or more than the machine has.
     """
     evidence = identification.evidence
-    present = evidence.frequency.shape[1]
-    if count <= present:
-        raise InputError(f"count must be above the {present} modes that are measured at a position, but is {count}.")
     positions = [float(position) for position in evidence.position]
     found = measured_modes(identification.machine, positions, count=count, outputs=evidence.outputs)
-    further = [reference_modes(modes, indices=tuple(range(present, count))) for modes in found]
+    missing = [tuple(sorted(set(range(count)) - taken)) for taken in _measured(identification)]
+    if not any(missing):
+        raise InputError(f"The first {count} modes are all measured at each position. Ask for a count above {count}.")
+    further = [reference_modes(modes, indices=indices) for modes, indices in zip(found, missing, strict=True)]
     return _like(evidence, ModesResidual.of(further, positions, kinds=evidence.kinds))
 
 
@@ -112,7 +115,7 @@ def usual_candidates(identification: MachineIdentification) -> dict[str, ModesRe
     evidence = identification.evidence
     found = {repeat_name(5, (kind,)): repeated(identification, 5, kinds=(kind,)) for kind in evidence.kinds}
     own = identification.machine.second_order(float(evidence.position[0]), inputs=(), outputs=evidence.outputs)
-    present = evidence.frequency.shape[1]
+    present = max(evidence.frequency.shape[1], 1 + max(max(taken, default=-1) for taken in _measured(identification)))
     count = min(present + (present + 1) // 2, own.mass.shape[0])
     if count > present:
         found[f"{count} modes at each position"] = more_modes(identification, count)
@@ -127,6 +130,19 @@ def repeat_name(times: int, kinds: Sequence[str]) -> str:
         kinds: which of frequency, shape and damping.
     """
     return f"{' and '.join(_NAMES[kind] for kind in kinds)} measured {_COUNTS.get(times, f'{times} times')}"
+
+
+def _measured(identification: MachineIdentification) -> list[set[int]]:
+    """Which modes of the machine are measured and count at each position."""
+    evidence = identification.evidence
+    order = np.asarray(_order(evidence, identification.machine))
+    counts = np.asarray(evidence.weight) > 0
+    return [set(row[kept].tolist()) for row, kept in zip(order, counts, strict=True)]
+
+
+@eqx.filter_jit
+def _order(evidence: ModesResidual, machine: Machine) -> Array:
+    return evidence.pairs(machine).order
 
 
 def _like(

@@ -98,6 +98,8 @@ def modal_evidence(machine: Machine, references: Sequence[ReferenceModes], posit
 
 
 def _checked(machine: Machine, positions: Sequence[float]) -> tuple[float, ...]:
+    if len({round(1e3 * float(position)) for position in positions}) < len(positions):
+        raise InputError(f"positions {tuple(positions)} m name the same millimetre twice. Join their modes in one set.")
     for position in positions:
         machine.connections(float(position))  # raises off a rail, which a traced position could not
     return tuple(float(position) for position in positions)

@@ -9,17 +9,20 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from fitting.identification.machine_damping import DampingEstimate, damping_least_squares, least_disturbed
+from fitting.identification.machine_evidence import evidence
 from fitting.identification.machine_part_runs import PartRuns
 from fitting.identification.machine_parts import solve_parts
-from fitting.identification.machine_selection import PAPER, StiffnessSelection, select_stiffness
+from fitting.identification.machine_selection import PAPER, ROBUST, StiffnessSelection, select_stiffness
 from fitting.identification.machine_sensitivity import MachineSensitivity, machine_sensitivity
+from fitting.identification.machine_unknowns import unknowns
+from twin._checks import InputError
 from twin.modal import ReferenceModes
 from twin.parameters import ParameterSpace
 from twin.structure import Machine
 
 
 class Seconds(NamedTuple):
-    """Time that the steps took, compilation included [s]."""
+    """Time that the steps took, with compilation where the process had not compiled them before [s]."""
 
     sensitivity: float
     """Sensitivity study."""
@@ -57,6 +60,11 @@ class GuidedIdentification(NamedTuple):
         """The identified machine."""
         return self.chosen.machine
 
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Paths of the stiffnesses that no mode tells; they stayed as they were."""
+        return self.chosen.selection.missing
+
 
 def identify_by_parts(
     machine: Machine,
@@ -80,10 +88,11 @@ def identify_by_parts(
     which are linear in the dampers, give these.
 
     Args:
-        machine: machine; its values of the unknown parameters play no part.
+        machine: machine; of its values of the unknown parameters those stiffnesses stay that no mode tells, see
+            `GuidedIdentification.missing`; the others play no part.
         references: reference modes, one set for each position.
         positions: axis positions [m].
-        space: unknown stiffnesses and dampings of joints, with bounds.
+        space: unknown stiffnesses and dampings of joints, with bounds, on a linear scale for starts that are uniform.
         seed: of samples and starts, from 1.
         n: base points of the sensitivity study, a power of two.
         starts: runs of each small problem.
@@ -97,12 +106,16 @@ def identify_by_parts(
         The identification.
 
     Raises:
-        InputError: as `machine_sensitivity`, `solve_parts`, `select_stiffness` and `damping_least_squares`.
+        InputError: no mode that a stiffness moves by more than the threshold, and as `machine_sensitivity`,
+            `solve_parts`, `select_stiffness` and `damping_least_squares`.
     """
+    _check(references, positions, space, starts, threshold, rule, equations)
     clock = [time.perf_counter()]
     sensitivity = machine_sensitivity(machine, references, positions, space, seed=seed, n=n, threads=threads)
     clock.append(time.perf_counter())
     searched = sensitivity.searched(threshold)
+    if not searched[:, unknowns(space).stiffness].any():
+        raise InputError(f"No stiffness has a total effect above {threshold:g} on any mode. Lower the threshold.")
     runs = solve_parts(machine, references, positions, space, searched, seed=seed, starts=starts, threads=threads)
     clock.append(time.perf_counter())
     chosen = choose(machine, references, positions, runs, sensitivity, rule=rule, equations=equations, least=least)
@@ -145,3 +158,30 @@ def choose(
     rows = None if equations is None else least_disturbed(sensitivity, equations)
     damping = damping_least_squares(stiff, references, positions, runs.space, rows=rows, least=least)
     return ByRule(selection, damping, damping.machine(stiff))
+
+
+def _check(
+    references: Sequence[ReferenceModes],
+    positions: Sequence[float],
+    space: ParameterSpace,
+    starts: int,
+    threshold: float,
+    rule: str,
+    equations: int | None,
+) -> None:
+    """Refuse at once what would only be refused after minutes."""
+    count = sum(one.omega.size for one in evidence(references, positions))
+    if not 0 < threshold < 1:
+        raise InputError(f"threshold must be between 0 and 1, but is {threshold:g}. 0.01 stands for 1 %.")
+    if rule not in (PAPER, ROBUST):
+        raise InputError(f"rule must be {PAPER!r} or {ROBUST!r}, but is {rule!r}.")
+    if starts < 2:
+        raise InputError(f"starts must be at least 2, but is {starts}: runs are judged by how far they agree.")
+    if equations is not None and not 1 <= equations <= count:
+        raise InputError(
+            f"equations must be between 1 and the {count} reference modes, but is {equations}. None takes all modes."
+        )
+    kinds = unknowns(space)
+    for name, numbers in (("stiffness", kinds.stiffness), ("damping", kinds.damping)):
+        if numbers.size == 0:
+            raise InputError(f"The space has no {name}. Add joints.<name>.<kind>.<direction>, see unknown_space.")

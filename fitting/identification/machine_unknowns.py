@@ -62,8 +62,14 @@ def stiffness_space(space: ParameterSpace) -> ParameterSpace:
 
     Args:
         space: of a machine's joints.
+
+    Raises:
+        InputError: a space without one.
     """
-    return space.subset([path for path in space.paths if ".stiffness." in path])
+    paths = [path for path in space.paths if ".stiffness." in path]
+    if not paths:
+        raise InputError("The space has no stiffness of a joint for the balance of forces. Add one, or give a start.")
+    return space.subset(paths)
 
 
 def nuisance_space(quantities: Sequence[Quantity]) -> ParameterSpace:

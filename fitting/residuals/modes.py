@@ -27,7 +27,7 @@ class ModesResidual(AbstractResidual):
     Log frequencies, mass-normalised shapes relative to the rms of the reference's, and log damping ratios, each over
     its standard deviation. Each reference mode is compared with the simulated mode that is most like it: by MACXP with
     so much damping that frequencies far apart do not hide a likeness of shapes. The pairing is not differentiated.
-    A mode that was not measured at some position is left out of its reference, or NaN in it.
+    A mode that was not measured at some position is left out of its reference.
 
     Raises:
         InputError: no position, positions with different outputs, shapes that are not real, a reference mode without
@@ -70,7 +70,7 @@ class ModesResidual(AbstractResidual):
         """Evidence from the modes measured at each position.
 
         Args:
-            references: measured modes, one for each position, with the same outputs and as many modes.
+            references: measured modes, one set for each position, with the same outputs.
             positions: axis positions [m].
             frequency_deviation: relative standard deviation of the frequencies [-].
             shape_deviation: that of the shapes' entries, as a share of the rms of the shape [-].
@@ -92,6 +92,12 @@ class ModesResidual(AbstractResidual):
                 raise InputError(
                     "The reference's shapes are complex. Turn each by its phase and take the real part: shapes of "
                     "lightly damped modes are real to first order."
+                )
+            largest = float(jnp.max(reference.damping_ratio, initial=0.0))
+            if largest >= 1:
+                raise InputError(
+                    f"A damping ratio at position {position:g} m is {largest:g}, but must be below 1 for a mode to "
+                    "oscillate. Give plain numbers, not per cent."
                 )
         most = max(r.frequency.size for r in references)
         frequency, ratio, shapes, weight = zip(*(_padded(reference, most) for reference in references), strict=True)

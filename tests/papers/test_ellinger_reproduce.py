@@ -5,23 +5,36 @@ import subprocess
 import sys
 
 import numpy as np
+import pandas as pd
 import pytest
 
 pytestmark = pytest.mark.slow
 MEASURES = ("frac", "csf", "macxp", "ndd")
-# Tables 2 and 3: worst, 5 % percentile, mean, median [%].
+# Tables 2 to 5: worst, 5 % percentile, mean, median [%].
 PRINTED = {
-    "identification": {
+    2: {
         "frac": (84.93, 86.21, 94.92, 96.12),
         "csf": (91.72, 92.78, 97.17, 98.04),
         "macxp": (99.86, 99.88, 99.97, 100.00),
         "ndd": (4.10, 1.99, 0.52, 0.27),
     },
-    "validation": {
+    3: {
         "frac": (79.17, 79.41, 90.21, 91.63),
         "csf": (88.43, 88.78, 94.19, 95.58),
         "macxp": (99.86, 99.89, 99.98, 100.00),
         "ndd": (5.48, 4.73, 1.07, 0.24),
+    },
+    4: {
+        "frac": (92.15, 96.70, 99.26, 99.85),
+        "csf": (95.73, 97.15, 99.49, 99.91),
+        "macxp": (99.92, 99.96, 99.99, 100.00),
+        "ndd": (1.69, 1.51, 0.40, 0.25),
+    },
+    5: {
+        "frac": (97.53, 98.41, 99.60, 99.83),
+        "csf": (97.36, 98.36, 99.64, 99.91),
+        "macxp": (88.57, 89.78, 98.65, 99.99),
+        "ndd": (40.65, 39.83, 6.05, 0.43),
     },
 }
 
@@ -61,13 +74,17 @@ def test_the_disturbed_model_comes_close(summary):
     assert min(one["validation"]["frac_mean"] for one in by_truth) >= 99.8
 
 
-@pytest.mark.parametrize("where", sorted(PRINTED))
-def test_tables_2_and_3_are_better_in_every_entry(summary, where):
-    ours = summary["ideal"]["tables"]["refined"][where]
+@pytest.mark.parametrize("number", sorted(PRINTED))
+def test_tables_are_better_in_every_entry_after_the_joint_fit(summary, folder, number):
+    case = "ideal" if number < 4 else "disturbed"
+    where = "identification" if number % 2 == 0 else "validation"
+    ours = summary[case]["tables"]["refined"][where]
+    written = pd.read_csv(folder / f"table{number}.csv", header=[0, 1], index_col=0)
     for measure in MEASURES:
         # As printed, with two digits: 100.00 cannot be beaten.
-        found, printed = np.round(list(ours[measure].values()), 2), np.asarray(PRINTED[where][measure])
+        found, printed = np.round(list(ours[measure].values()), 2), np.asarray(PRINTED[number][measure])
         assert np.all(found <= printed if measure == "ndd" else found >= printed), measure
+        np.testing.assert_array_equal(written[measure.upper(), "paper"], printed)
     assert ours["frac"]["worst"] > 99.0
     assert ours["unpaired"] == 0
 
@@ -77,13 +94,18 @@ def test_the_published_procedure_is_repeated_in_full(summary):
     assert len(summary["gsa"]["searched_per_problem"]) == 60
     assert 0 < min(summary["gsa"]["searched_per_problem"]) <= max(summary["gsa"]["searched_per_problem"]) <= 16
     assert summary["multistart"]["solves"] == 6000
-    assert summary["multistart"]["failed"] < 300
+    assert all(failed < 300 for failed in summary["failed_by_case"].values())
+    assert summary["gsa"]["screening"]["largest_total_effect_cleared"] < 0.01
     selected = summary["ideal"]["paper_selection"]
     # As in the paper most stiffnesses come out well and a few do not; the joint fit mends all.
     assert selected["published"]["stiffness_median"] < 3.0
     assert selected["published"]["stiffness_worst"] > 1.0
     assert selected["refined"]["stiffness_worst"] < 0.1
     assert selected["refined"]["damping_worst"] < 1.0
+    # Under model error the printed rule picks runs that end on a bound; the robust one is right in the median.
+    selected = summary["disturbed"]["paper_selection"]
+    assert selected["published"]["stiffness_worst"] > 10.0
+    assert selected["robust"]["stiffness_median"] < 1.0
 
 
 def test_dampings_dealt_to_others_are_worse(summary):
@@ -96,4 +118,5 @@ def test_files_are_written(folder):
     tables = {f"table{i}.csv" for i in (2, 3, 4, 5)}
     pictures = {"fig2_runs.png", "fig5_sensitivity.png", "fig6_deviations.png", "fig7_response.png"}
     pictures |= {"fig8_deviations.png", "fig9_response.png", "effects_macxp.png", "effects_ndd.png"}
-    assert names >= tables | pictures | {"summary.json", "parameters.toml"}
+    studies = {f"{what}_{case}.csv" for what in ("sensitivity", "problems") for case in ("ideal", "disturbed")}
+    assert names >= tables | pictures | studies | {"summary.json", "parameters.toml"}

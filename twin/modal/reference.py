@@ -23,7 +23,7 @@ def _as_shapes(value: Any) -> Inexact[Array, "outputs modes"]:
 class ReferenceModes(eqx.Module):
     """Natural frequencies, damping ratios and shapes at measured rows, as modal analysis of a machine gives them.
 
-    A mode that was not found is left out; in a batch, where all must have one size, it is NaN.
+    A mode that was not found is left out.
     """
 
     frequency: Float[Array, "modes"] = eqx.field(converter=as_array)

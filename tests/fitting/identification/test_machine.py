@@ -112,6 +112,18 @@ def test_the_same_deviations_of_other_dampings_are_worse():
     assert control.ndd.mean > 2 * own.ndd.mean
 
 
+@pytest.mark.slow
+def test_frequencies_in_rad_per_second_do_not_pass_unnoticed():
+    wrong = [
+        ReferenceModes(2 * np.pi * one.frequency, one.damping_ratio, one.output_shapes, one.outputs)
+        for one in measured_modes(random_truth(3), IDENTIFICATION)
+    ]
+    with pytest.warns(UserWarning, match="of 60 measured modes are paired.*Hz"):
+        found = identify_machine(MACHINE, wrong, IDENTIFICATION, SPACE, start=MACHINE)
+    assert not found.success
+    assert "too unlike" in repr(found) and "too unlike" in found._repr_html_()
+
+
 def test_bad_input():
     references = measured_modes(MACHINE, IDENTIFICATION)
     with pytest.raises(InputError, match="rail"):
@@ -141,3 +153,18 @@ def test_bad_input():
             IDENTIFICATION,
             ParameterSpace([Parameter("joints.guide.stiffness.x", "N/m", 1e8, 2e8)]),
         )
+
+
+def test_what_would_pass_as_a_measurement_is_refused():
+    references = measured_modes(MACHINE, IDENTIFICATION[:1], count=4)
+    per_cent = [ReferenceModes(r.frequency, 100 * r.damping_ratio, r.output_shapes, r.outputs) for r in references]
+    with pytest.raises(InputError, match="not per cent"):
+        identify_machine(MACHINE, per_cent, IDENTIFICATION[:1], SPACE)
+    with pytest.raises(InputError, match="same millimetre twice"):
+        identify_machine(MACHINE, [*references, *references], [IDENTIFICATION[0]] * 2, SPACE)
+    far = [ReferenceModes(1e4 * r.frequency, r.damping_ratio, r.output_shapes, r.outputs) for r in references]
+    with pytest.raises(InputError, match="like any of the 4 measured"):
+        identify_machine(MACHINE, far, IDENTIFICATION[:1], SPACE, start=MACHINE)
+    dampings = SPACE.subset([path for path in SPACE.paths if ".stiffness." not in path])
+    with pytest.raises(InputError, match="no stiffness of a joint"):
+        identify_machine(MACHINE, references, IDENTIFICATION[:1], dampings)

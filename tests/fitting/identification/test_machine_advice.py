@@ -2,6 +2,7 @@
 
 import functools
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import matplotlib
@@ -132,8 +133,8 @@ def test_weak_ones_are_named_with_what_helps():
     assert len(found.sentences()) == len(found.weak)
     assert found.sentences()[0].startswith(f"{WEAK} is known to ")
     assert "would bring it to" in found.sentences()[0]
-    loose = helpful_measurements(identified(), [FURTHER], {}, limit=10.0)
-    # Known to better than the limit, but not within its bounds: that it is not identified is said all the same.
+    loose = helpful_measurements(identified(), [FURTHER], {}, limit=0.99)
+    # What is not determined within its bounds is named whatever the limit.
     assert loose.weak == (WEAK,)
     assert loose.candidates == ("modes at z = -0.294 m",)
     assert WEAK in repr(found)
@@ -194,10 +195,27 @@ def test_picture():
     plt.close("all")
 
 
+def test_more_modes_are_those_that_are_not_measured():
+    found = identified()
+    np.testing.assert_allclose(
+        more_modes(found, COUNT + 2).frequency,
+        [modes.frequency[COUNT:] for modes in measured_modes(found.machine, PLACES, count=COUNT + 2)],
+    )
+    # The third mode was not found at the second position.
+    left_out = eqx.tree_at(lambda e: e.weight, found.evidence, found.evidence.weight.at[1, 2].set(0.0))
+    own = measured_modes(found.machine, PLACES, count=COUNT)[1].frequency
+    missed = int(found.evidence.pairs(found.machine).order[1, 2])
+    further = more_modes(found._replace(evidence=left_out), COUNT)
+    np.testing.assert_array_equal(np.sum(further.weight > 0, axis=1), [0, 1])
+    np.testing.assert_allclose(further.frequency[1, 0], own[missed])
+
+
 def test_bad_input():
     found = identified()
-    with pytest.raises(InputError, match="limit must be a positive share"):
+    with pytest.raises(InputError, match="limit must be a share"):
         helpful_measurements(found, [FURTHER], limit=0.0)
+    with pytest.raises(InputError, match=r"0.1 for 10 %"):
+        helpful_measurements(found, [FURTHER], limit=10.0)
     with pytest.raises(InputError, match="rail"):
         helpful_measurements(found, [2.0], {})
     with pytest.raises(InputError, match="place on the rail"):
@@ -212,7 +230,7 @@ def test_bad_input():
         repeated(found, 2, kinds=("phase",))
     with pytest.raises(InputError, match="kinds is empty"):
         repeated(found, 2, kinds=())
-    with pytest.raises(InputError, match="above the 8 modes"):
+    with pytest.raises(InputError, match="8 modes are all measured"):
         more_modes(found, COUNT)
     with pytest.raises(InputError, match="fewer modes"):
         more_modes(found, 1000)

@@ -47,3 +47,24 @@ def test_another_rule_takes_the_same_runs_and_all_equations(guided):
     assert len(robust.damping.problems) == len(small_study().problems)
     with pytest.raises(InputError, match="rule"):
         choose(nominal(), measured(), PLACES, guided.runs, guided.sensitivity, rule="least")
+
+
+WRONG = [
+    ({"rule": "papr"}, "rule must be"),
+    ({"threshold": 5.0}, "threshold must be between 0 and 1"),
+    ({"starts": 1}, "starts must be at least 2"),
+    ({"equations": 20}, "equations must be between 1 and the 12"),
+]
+
+
+@pytest.mark.parametrize(("wrong", "message"), WRONG)
+def test_what_cannot_be_is_refused_before_the_study(wrong, message):
+    with pytest.raises(InputError, match=message):
+        identify_by_parts(nominal(), measured(), PLACES, space(), **{"seed": 1, "equations": EQUATIONS} | wrong)
+
+
+@pytest.mark.parametrize(("kind", "missing"), [("stiffness", "damping"), ("viscous", "stiffness")])
+def test_a_space_of_one_kind_is_refused(kind, missing):
+    some = space().subset([path for path in space().paths if f".{kind}." in path])
+    with pytest.raises(InputError, match=f"no {missing}"):
+        identify_by_parts(nominal(), measured(), PLACES, some, seed=1, equations=EQUATIONS)

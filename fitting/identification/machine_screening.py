@@ -2,8 +2,8 @@
 
 Measured on the reference machine, 20 modes at z2 to z4, against the Sobol study with 1024 base points: 256 samples take
 3 % of its time, and clear 628 of the 660 pairs of a mode and a stiffness whose total effect on MACXP is below 1 %, and
-none that is above with all of its interval. No parameter is cleared of every mode, so that there is none to leave out of
-the whole study.
+none that is above with all of its interval. No parameter is cleared of every mode, so that there is none to leave
+out of the whole study.
 """
 
 import dataclasses

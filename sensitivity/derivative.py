@@ -14,6 +14,7 @@ from sensitivity._estimators import normalised
 from sensitivity._unit_cube import from_unit, require_bounds, require_power_of_two, require_seed
 from sensitivity.derivative_result import DerivativeMeasures
 from sensitivity.evaluation import evaluate, named_columns, require_finite
+from sensitivity.partition import require_threshold
 from twin._checks import InputError
 from twin.parameters import ParameterSpace
 
@@ -182,8 +183,7 @@ def screen(measures: DerivativeMeasures, threshold: float = 0.01) -> Screening:
     Raises:
         InputError: a threshold outside 0 to 1.
     """
-    if not 0 < threshold < 1:
-        raise InputError(f"threshold must be between 0 and 1, but is {threshold}. 0.01 stands for 1 %.")
+    require_threshold(threshold)
     highest = (measures.bound + measures.bound_conf).max(axis=0)
     kept = highest >= threshold
     paths = np.asarray(measures.names)

@@ -127,8 +127,20 @@ def partition(indices: SobolIndices, threshold: float = 0.01, *, interval: bool 
     References:
         J. Ellinger and M. F. Zaeh, Machines 10 (2022) 535, sections 2.3.1 and 3.2.
     """
-    if not 0 < threshold < 1:
-        raise InputError(f"threshold must be between 0 and 1, but is {threshold}. 0.01 stands for 1 %.")
+    require_threshold(threshold)
     half = indices.ST_conf if interval else np.zeros_like(indices.ST_conf)
     above, below = indices.ST - half > threshold, indices.ST + half <= threshold
     return Partition(indices, threshold, np.where(above, IN, np.where(below, OUT, UNDECIDED)))
+
+
+def require_threshold(threshold: float) -> None:
+    """Raise unless a total effect can lie above and below.
+
+    Args:
+        threshold: total effect that matters [-].
+
+    Raises:
+        InputError: no share between 0 and 1.
+    """
+    if not 0 < threshold < 1:
+        raise InputError(f"threshold must be between 0 and 1, but is {threshold}. 0.01 stands for 1 %.")

@@ -177,8 +177,7 @@ def _screened(case: Case) -> dict[str, Any]:
     cleared = ~case.screening.matters()[:, case.guided.runs.stiffness]
     sensitivity, stiffness = case.guided.sensitivity, case.guided.runs.stiffness
     total = sensitivity.total(SHAPE)[:, stiffness]
-    rows = [sensitivity.indices.index(f"{SHAPE} {name}") for name in sensitivity.problems]
-    certain = total - sensitivity.indices.ST_conf[rows][:, stiffness] > case.screening.threshold
+    certain = total - sensitivity.half_width(SHAPE)[:, stiffness] > case.screening.threshold
     return {
         "samples": int(case.screening.measures.n),
         "seconds": case.screening_seconds,

@@ -63,15 +63,19 @@ class MachineIdentification(NamedTuple):
     @property
     def success(self) -> bool:
         """Whether the fit converged, and on at least half of the measured modes."""
-        return self.fit.success and self._paired >= _ENOUGH * self._measured
+        return self.fit.success and self._alike
 
     @property
     def message(self) -> str:
         """How many modes were paired, and why the fit ended."""
         found = f"{self._paired} of {self._measured} measured modes are paired with modes of the machine."
-        if self._paired < _ENOUGH * self._measured:
+        if not self._alike:
             found += f" {_UNLIKE}"
         return f"{found} {self.fit.message}"
+
+    @property
+    def _alike(self) -> bool:
+        return self._paired >= _ENOUGH * self._measured
 
     @property
     def _paired(self) -> int:
@@ -174,7 +178,7 @@ def identify_machine(
     )
     used = eqx.tree_at(lambda d: d.weight, data, jnp.asarray(weight))
     found = MachineIdentification(result.model, balanced, result, unpaired, used)
-    if 2 * len(unpaired) > np.count_nonzero(measured):
+    if not found._alike:
         warnings.warn(found.message, stacklevel=2)
     return found
 

@@ -76,9 +76,21 @@ def evidence(references: Sequence[ReferenceModes], positions: Sequence[float]) -
         raise InputError(
             f"There are {len(references)} sets of reference modes for {len(positions)} positions. Give one each."
         )
+    require_distinct(positions)
+    return tuple(_one(modes, float(z), references[0].outputs) for modes, z in zip(references, positions, strict=True))
+
+
+def require_distinct(positions: Sequence[float]) -> None:
+    """Raise unless all positions lie on different millimetres.
+
+    Args:
+        positions: axis positions [m].
+
+    Raises:
+        InputError: two that do not.
+    """
     if len({round(1e3 * float(z)) for z in positions}) < len(positions):
         raise InputError(f"positions {tuple(positions)} m name the same millimetre twice. Join their modes in one set.")
-    return tuple(_one(modes, float(z), references[0].outputs) for modes, z in zip(references, positions, strict=True))
 
 
 def _one(modes: ReferenceModes, position: float, outputs: tuple[str, ...]) -> Evidence:

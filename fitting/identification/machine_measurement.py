@@ -6,6 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from fitting.identification.machine_evidence import require_distinct
 from fitting.residuals.modes import ModesResidual
 from twin._checks import InputError
 from twin.modal import ReferenceModes, modes, reference_modes
@@ -98,8 +99,7 @@ def modal_evidence(machine: Machine, references: Sequence[ReferenceModes], posit
 
 
 def _checked(machine: Machine, positions: Sequence[float]) -> tuple[float, ...]:
-    if len({round(1e3 * float(position)) for position in positions}) < len(positions):
-        raise InputError(f"positions {tuple(positions)} m name the same millimetre twice. Join their modes in one set.")
+    require_distinct(positions)
     for position in positions:
         machine.connections(float(position))  # raises off a rail, which a traced position could not
     return tuple(float(position) for position in positions)

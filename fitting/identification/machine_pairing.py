@@ -1,7 +1,8 @@
 """The modes of a machine at many samples of its stiffnesses, and which of them belongs to which reference mode."""
 
 import functools
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +11,10 @@ from jaxtyping import Bool, Float, Int
 
 from fitting.identification.machine_affine import AffineMachine
 from fitting.identification.machine_evidence import Evidence
+from fitting.shared_out import shared_out
 from twin.correlation import assign
+
+Place = TypeVar("Place")
 
 CHUNK = 64
 """Samples solved at once: their matrices stay in the cache."""
@@ -61,6 +65,30 @@ def paired_samples(
     order = np.where(paired, order, alike.argmax(axis=1))
     macxp = np.take_along_axis(alike, order[:, None], axis=1)[:, 0]
     return PairedSamples(values, shapes, order, paired, macxp)
+
+
+def in_chunks(
+    function: Callable[[Place, np.ndarray], tuple[np.ndarray, ...]],
+    places: Sequence[Place],
+    samples: np.ndarray,
+    threads: int | None = None,
+) -> list[tuple[np.ndarray, ...]]:
+    """Results of a function for all samples at several places, `CHUNK` samples at a time, several chunks side by side.
+
+    Args:
+        function: from a place and some samples to arrays with one row for each sample.
+        places: what differs from one axis position to the next.
+        samples: all samples, one a row.
+        threads: chunks done side by side; the number of cores if not given.
+
+    Returns:
+        The arrays of each place, with all samples.
+    """
+    starts = range(0, len(samples), CHUNK)
+    tasks = [(place, samples[i : i + CHUNK]) for place in places for i in starts]
+    done = iter(shared_out(lambda task: function(*task), tasks, threads))
+    each = [[next(done) for _ in starts] for _ in places]
+    return [tuple(np.concatenate(arrays) for arrays in zip(*chunks, strict=True)) for chunks in each]
 
 
 def _paired(alike: Float[np.ndarray, "samples n references"], threshold: float) -> tuple[np.ndarray, np.ndarray]:

@@ -78,8 +78,7 @@ def solve_parts(
         raise InputError(
             f"searched has shape {mask.shape}, but there are {count} reference modes and {len(space)} parameters."
         )
-    if starts < 2:
-        raise InputError(f"starts must be at least 2, but is {starts}: runs are judged by how far they agree.")
+    require_starts(starts)
     if rounds < 0:
         raise InputError(f"rounds must not be negative, but is {rounds}. Take 0 to solve no run again.")
     mask = mask[:, parts[0].stiffness]
@@ -114,6 +113,19 @@ def solve_parts(
         ended = _solved(problems, begin, todo, data_from_mode, **settings)
         runs, begin = _mended(runs, owner, begin, todo, ended, threads)
     return runs
+
+
+def require_starts(starts: int) -> None:
+    """Raise unless a problem has runs that can agree.
+
+    Args:
+        starts: runs of each problem.
+
+    Raises:
+        InputError: fewer than two.
+    """
+    if starts < 2:
+        raise InputError(f"starts must be at least 2, but is {starts}: runs are judged by how far they agree.")
 
 
 def _solved(

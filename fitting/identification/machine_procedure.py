@@ -11,10 +11,11 @@ from typing import NamedTuple
 from fitting.identification.machine_damping import DampingEstimate, damping_least_squares, least_disturbed
 from fitting.identification.machine_evidence import evidence
 from fitting.identification.machine_part_runs import PartRuns
-from fitting.identification.machine_parts import solve_parts
-from fitting.identification.machine_selection import PAPER, ROBUST, StiffnessSelection, select_stiffness
+from fitting.identification.machine_parts import require_starts, solve_parts
+from fitting.identification.machine_selection import PAPER, StiffnessSelection, require_rule, select_stiffness
 from fitting.identification.machine_sensitivity import MachineSensitivity, machine_sensitivity
 from fitting.identification.machine_unknowns import unknowns
+from sensitivity.partition import require_threshold
 from twin._checks import InputError
 from twin.modal import ReferenceModes
 from twin.parameters import ParameterSpace
@@ -171,12 +172,9 @@ def _check(
 ) -> None:
     """Refuse at once what would only be refused after minutes."""
     count = sum(one.omega.size for one in evidence(references, positions))
-    if not 0 < threshold < 1:
-        raise InputError(f"threshold must be between 0 and 1, but is {threshold:g}. 0.01 stands for 1 %.")
-    if rule not in (PAPER, ROBUST):
-        raise InputError(f"rule must be {PAPER!r} or {ROBUST!r}, but is {rule!r}.")
-    if starts < 2:
-        raise InputError(f"starts must be at least 2, but is {starts}: runs are judged by how far they agree.")
+    require_threshold(threshold)
+    require_rule(rule)
+    require_starts(starts)
     if equations is not None and not 1 <= equations <= count:
         raise InputError(
             f"equations must be between 1 and the {count} reference modes, but is {equations}. None takes all modes."

@@ -14,13 +14,12 @@ from jaxtyping import Bool, Float
 
 from fitting.identification.machine_affine import AffineMachine, affine_machine
 from fitting.identification.machine_evidence import Evidence, evidence
-from fitting.identification.machine_pairing import CHUNK, paired_samples
+from fitting.identification.machine_pairing import in_chunks, paired_samples
 from fitting.identification.machine_sensitivity import DAMPING, SHAPE, output_names, require_modes
-from fitting.identification.machine_slopes import ModeSlopes, mode_slopes
+from fitting.identification.machine_slopes import mode_slopes
 from fitting.identification.machine_unknowns import STIFFNESS, unknowns
-from fitting.shared_out import shared_out
-from sensitivity import DerivativeMeasures, derivative_samples, measures_from_derivatives, screen
-from twin._checks import InputError
+from sensitivity import DerivativeMeasures, derivative_samples, measures_from_derivatives
+from sensitivity.partition import require_threshold
 from twin.modal.reference import ReferenceModes
 from twin.parameters import ParameterSpace
 from twin.structure import Machine
@@ -43,9 +42,8 @@ class MachineScreening:
     @property
     def kept(self) -> tuple[str, ...]:
         """Paths of the parameters that may matter for some mode; `machine_sensitivity` takes them as `only`."""
-        bounded = screen(self.measures, self.threshold).kept
-        jumping = {self.measures.names[i] for i in np.flatnonzero(np.any(self.matters(DAMPING), axis=0))}
-        return tuple(path for path in self.measures.names if path in bounded or path in jumping)
+        kept = np.any(self.matters(SHAPE) | self.matters(DAMPING), axis=0)
+        return tuple(path for path, keep in zip(self.measures.names, kept, strict=True) if keep)
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -122,41 +120,30 @@ def screen_machine(
             data that cannot be compared, fewer modes than reference modes, a position off the rail, a threshold outside
             0 to 1.
     """
-    if not 0 < threshold < 1:
-        raise InputError(f"threshold must be between 0 and 1, but is {threshold}. 0.01 stands for 1 %.")
+    require_threshold(threshold)
     data = evidence(references, positions)
     parts = [affine_machine(machine, space, one.position, one.outputs) for one in data]
     require_modes(parts, data)
     samples = derivative_samples(space, n, seed=seed)
-    tasks = [
-        (part, one, samples[i : i + CHUNK], least_macxp)
-        for part, one in zip(parts, data, strict=True)
-        for i in range(0, n, CHUNK)
-    ]
-    done = shared_out(_differentiated, tasks, threads)
-    each = len(done) // len(data)
-
-    def joined(name: str) -> np.ndarray:
-        own = [[getattr(slopes, name) for slopes, _ in done[k * each : (k + 1) * each]] for k in range(len(data))]
-        return np.concatenate([np.concatenate(chunks) for chunks in own], axis=1)
-
-    paired = [np.concatenate([p for _, p in done[k * each : (k + 1) * each]]) for k in range(len(data))]
+    places = [(part, one, least_macxp) for part, one in zip(parts, data, strict=True)]
+    done = in_chunks(_differentiated, places, samples, threads)
+    macxp, ndd, d_macxp, d_ndd, paired = (np.concatenate(arrays, axis=1) for arrays in zip(*done, strict=True))
     problems = tuple(label for one in data for label in one.labels)
     measures = measures_from_derivatives(
         space,
         samples,
-        np.concatenate([joined("macxp"), joined("ndd")], axis=1),
-        np.concatenate([joined("d_macxp"), joined("d_ndd")], axis=1),
+        np.concatenate([macxp, ndd], axis=1),
+        np.concatenate([d_macxp, d_ndd], axis=1),
         seed=seed,
         outputs=output_names(problems),
         confidence=confidence,
         resamples=resamples,
     )
-    unpaired = 1 - np.concatenate(paired, axis=1).mean(axis=0)
-    return MachineScreening(measures, threshold, unpaired, problems)
+    return MachineScreening(measures, threshold, 1 - paired.mean(axis=0), problems)
 
 
-def _differentiated(task: tuple[AffineMachine, Evidence, np.ndarray, float]) -> tuple[ModeSlopes, np.ndarray]:
-    part, one, samples, threshold = task
+def _differentiated(place: tuple[AffineMachine, Evidence, float], samples: np.ndarray) -> tuple[np.ndarray, ...]:
+    """`ModeSlopes` of some samples, and whether each reference mode is paired."""
+    part, one, threshold = place
     found = paired_samples(part, one, samples[:, part.stiffness], threshold)
-    return mode_slopes(part, one, found, samples[:, part.damping]), found.paired
+    return *mode_slopes(part, one, found, samples[:, part.damping]), found.paired

@@ -95,8 +95,7 @@ def select_stiffness(runs: PartRuns, rule: str = PAPER, *, least_macxp: float = 
 
     Source: section 2.3.2 of J. Ellinger, M. F. Zaeh, Machines 10 (2022) 535.
     """
-    if rule not in (PAPER, ROBUST):
-        raise InputError(f"rule must be {PAPER!r} or {ROBUST!r}, but is {rule!r}.")
+    require_rule(rule)
     if not 0 <= least_macxp < 1:
         raise InputError(f"least_macxp must be between 0 and 1, but is {least_macxp:g}.")
     counts = ~runs.failed[..., None] & runs.searched[:, None, :] & np.isfinite(runs.value)
@@ -123,3 +122,16 @@ def select_stiffness(runs: PartRuns, rule: str = PAPER, *, least_macxp: float = 
         np.where(told, problem, -1),
         np.where(told, chosen(left), 0),
     )
+
+
+def require_rule(rule: str) -> None:
+    """Raise unless a rule of selection is known.
+
+    Args:
+        rule: "paper" or "robust".
+
+    Raises:
+        InputError: another one.
+    """
+    if rule not in (PAPER, ROBUST):
+        raise InputError(f"rule must be {PAPER!r} or {ROBUST!r}, but is {rule!r}.")

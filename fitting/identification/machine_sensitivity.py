@@ -11,9 +11,8 @@ import numpy as np
 
 from fitting.identification.machine_affine import AffineMachine, affine_machine
 from fitting.identification.machine_evidence import Evidence, evidence
-from fitting.identification.machine_pairing import CHUNK, paired_samples
+from fitting.identification.machine_pairing import in_chunks, paired_samples
 from fitting.identification.machine_unknowns import unknowns
-from fitting.shared_out import shared_out
 from sensitivity import SobolIndices, SobolSamples, sobol_indices, sobol_samples
 from twin._checks import InputError
 from twin.modal.reference import ReferenceModes
@@ -44,7 +43,15 @@ class MachineSensitivity:
         Args:
             kind: "MACXP" or "NDD²".
         """
-        return self.indices.ST[[self.indices.index(name) for name in output_names(self.problems, (kind,))]]
+        return self.indices.ST[self._rows(kind)]
+
+    def half_width(self, kind: str) -> np.ndarray:
+        """Half widths of the confidence intervals of the total effects on MACXP or NDD², as of `total`.
+
+        Args:
+            kind: "MACXP" or "NDD²".
+        """
+        return self.indices.ST_conf[self._rows(kind)]
 
     def searched(self, threshold: float = 0.01, *, interval: bool = False) -> np.ndarray:
         """Which parameters are searched for each reference mode: by their total effect on MACXP.
@@ -56,8 +63,10 @@ class MachineSensitivity:
         Returns:
             Mask (modes of all positions, parameters).
         """
-        half = self.indices.ST_conf[[self.indices.index(name) for name in output_names(self.problems, (SHAPE,))]]
-        return self.total(SHAPE) + (half if interval else 0.0) > threshold
+        return self.total(SHAPE) + (self.half_width(SHAPE) if interval else 0.0) > threshold
+
+    def _rows(self, kind: str) -> list[int]:
+        return [self.indices.index(name) for name in output_names(self.problems, (kind,))]
 
 
 def machine_sensitivity(
@@ -183,15 +192,10 @@ def mode_outputs(
     distinct = samples.distinct(paths)
     stiffness = distinct.values[:, kinds.stiffness]
     dampings = samples.values[:, kinds.damping]
-    starts = range(0, len(stiffness), CHUNK)
-    tasks = [
-        (part, one, stiffness[i : i + CHUNK], threshold) for part, one in zip(parts, data, strict=True) for i in starts
-    ]
-    done = shared_out(_solved, tasks, threads)
+    places = [(part, one, threshold) for part, one in zip(parts, data, strict=True)]
+    done = in_chunks(_solved, places, stiffness, threads)
     shape, damping, missing = [], [], []
-    for number, one in enumerate(data):
-        own = done[number * len(starts) : (number + 1) * len(starts)]
-        value, paired, known, factors = (np.concatenate(arrays) for arrays in zip(*own, strict=True))
+    for one, (value, paired, known, factors) in zip(data, done, strict=True):
         ratio = known[distinct.back] + np.einsum("smd,sd->sm", factors[distinct.back], dampings, optimize=True)
         shape.append(value[distinct.back])
         damping.append((ratio / one.ratio - 1) ** 2)  # eq. 5
@@ -199,8 +203,8 @@ def mode_outputs(
     return np.concatenate(shape, axis=1), np.concatenate(damping, axis=1), np.concatenate(missing)
 
 
-def _solved(task: tuple[AffineMachine, Evidence, np.ndarray, float]) -> tuple[np.ndarray, ...]:
+def _solved(place: tuple[AffineMachine, Evidence, float], stiffness: np.ndarray) -> tuple[np.ndarray, ...]:
     """MACXP, whether paired, known damping and damping factors of the mode of each reference mode, for some samples."""
-    part, one, stiffness, threshold = task
+    part, one, threshold = place
     found = paired_samples(part, one, stiffness, threshold)
     return found.macxp, found.paired, *part.damping_ratios(found.omega, found.own)

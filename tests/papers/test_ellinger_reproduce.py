@@ -1,12 +1,11 @@
 """Ellinger and Zaeh on the reference machine, as the command line repeats it: tables 2 to 5, and every truth."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pandas as pd
 import pytest
+from reproduced import reproduced
 
 pytestmark = pytest.mark.slow
 MEASURES = ("frac", "csf", "macxp", "ndd")
@@ -41,13 +40,9 @@ PRINTED = {
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    out = tmp_path_factory.mktemp("ellinger")
-    code = "from fitting.cli import main; raise SystemExit(main())"
-    command = [sys.executable, "-c", code, "reproduce", "ellinger", "--out", str(out)]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=1800, check=False)
-    assert run.returncode == 0, run.stderr
-    assert "Ideal model, 20 random truths" in run.stdout
-    return out
+    return reproduced(
+        "ellinger", tmp_path_factory.mktemp("ellinger"), says="Ideal model, 20 random truths", timeout=1800
+    )
 
 
 @pytest.fixture(scope="module")

@@ -1,11 +1,10 @@
 """Leipe et al. on the simulated bench, as the command line repeats it: each figure of merit, and beyond."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from reproduced import reproduced
 
 pytestmark = pytest.mark.slow
 PUBLISHED_TORQUE_ERRORS = (0.4042, 0.3271)
@@ -17,13 +16,7 @@ LAWS = [
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    out = tmp_path_factory.mktemp("leipe")
-    code = "from fitting.cli import main; raise SystemExit(main())"
-    command = [sys.executable, "-c", code, "reproduce", "leipe", "--out", str(out)]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=900, check=False)
-    assert run.returncode == 0, run.stderr
-    assert "Validation move" in run.stdout
-    return out
+    return reproduced("leipe", tmp_path_factory.mktemp("leipe"), says="Validation move", timeout=900)
 
 
 @pytest.fixture(scope="module")

@@ -18,11 +18,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, PyTree
 
-from fitting.lapack import calls_lapack
 from fitting.objective import Objective, cost_of, equality_of, inequality_of, residual_of
 from fitting.solve import Solved, Solver, options_of, outcome
 from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt, BoundedState
 from fitting.solvers.stop import CONVERGED, STOPS, Stop
+from twin._lapack import calls_lapack
 from twin._recursion import tangents_alongside
 
 Combine = Callable[[Objective, Any], Objective]

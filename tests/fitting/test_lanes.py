@@ -7,11 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from fitting.lapack import calls_lapack
 from fitting.multistart import multistart
 from fitting.residuals.residual import AbstractResidual
 from tests.benchmarks.frequency_case import frequency_case
 from tests.fitting.curves import Coefficients, noisy, two_decays
+from twin._lapack import calls_lapack
 
 
 class Solved(AbstractResidual):

@@ -1,0 +1,189 @@
+"""Which samples of a batch are computed together: chunks of one shape, in an order."""
+
+import functools
+import os
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from twin._checks import InputError
+from twin._lapack import equations_of, mentions_lapack, traced
+
+WIDEST = 256
+"""Samples computed at once on a processor: wider chunks wait longer for their slowest sample and leave the cache."""
+WIDEST_WITHOUT_LOOPS = 4096
+"""The same where no sample can be slower than another."""
+WIDEST_ON_ACCELERATOR = 8192
+_BYTES = 2**26
+"""Memory for the largest intermediate result of a chunk."""
+
+
+class Plan(NamedTuple):
+    """Chunks of one width; the last one is filled up when it is computed."""
+
+    order: np.ndarray
+    """Numbers of the samples, in the order in which they are computed (samples,)."""
+    width: int
+    """Samples in a chunk."""
+
+    @property
+    def chunks(self) -> int:
+        """Number of chunks."""
+        return -(-len(self.order) // self.width)
+
+    def members(self, chunk: int) -> np.ndarray:
+        """Numbers of the samples in a chunk."""
+        return self.order[chunk * self.width : (chunk + 1) * self.width]
+
+
+class Traits(NamedTuple):
+    """What a program tells about how to run it."""
+
+    lapack: bool
+    """Whether it calls LAPACK, so that it must run alone in its process."""
+    loops: bool
+    """Whether it holds a loop, so that one sample can take longer than another."""
+    bytes: int
+    """Size of its largest intermediate result for one sample."""
+
+
+def as_samples(samples: Any) -> tuple[Any, int]:
+    """Samples as NumPy arrays with one first axis, and how many they are.
+
+    Args:
+        samples: array, or any structure of arrays, or a table of columns.
+
+    Raises:
+        InputError: no samples, texts or objects, samples of unequal length.
+    """
+    if hasattr(samples, "columns") and hasattr(samples, "to_numpy"):
+        samples = {str(name): samples[name].to_numpy() for name in samples.columns}
+    lengths = {}
+    for path, leaf in jax.tree_util.tree_leaves_with_path(samples):
+        name = f"samples{jax.tree_util.keystr(path)}"
+        array = np.asarray(leaf)
+        if array.dtype.kind not in "fiubc":
+            raise InputError(f"{name} holds {array.dtype} values, but numbers were expected.")
+        if array.ndim == 0:
+            raise InputError(f"{name} is a single number; give an array with one entry for each sample.")
+        lengths[name] = len(array)
+    if not lengths or not all(lengths.values()):
+        raise InputError("There are no samples. Give an array, or a dict of arrays, with one row for each sample.")
+    if len(set(lengths.values())) > 1:
+        seen = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise InputError(f"The samples are of unequal length: {seen}. Give each sample a row in every array.")
+    return jax.tree.map(np.asarray, samples), next(iter(lengths.values()))
+
+
+def whole_rows(samples: Any, count: int) -> np.ndarray:
+    """Which samples hold no NaN; infinity passes, as for a limit that is not there (samples,)."""
+    good = np.ones(count, dtype=bool)
+    for leaf in jax.tree.leaves(samples):
+        if leaf.dtype.kind in "fc":
+            good &= ~np.isnan(leaf.reshape(count, -1)).any(axis=1)
+    return good
+
+
+def rows_of(samples: Any, numbers: np.ndarray) -> Any:
+    """Some of the samples, in their structure."""
+    return jax.tree.map(lambda leaf: leaf[numbers], samples)
+
+
+def ordered(difficulty: Any, count: int) -> np.ndarray:
+    """Order of the samples, the hardest first: alike ones share a chunk, and no long chunk comes last.
+
+    Args:
+        difficulty: expected effort for each sample, in any unit; None where it is not known.
+        count: number of samples.
+
+    Raises:
+        InputError: another length, NaN.
+    """
+    if difficulty is None:
+        return np.arange(count)
+    effort = np.asarray(difficulty, dtype=float)
+    if effort.shape != (count,) or np.isnan(effort).any():
+        raise InputError(
+            f"difficulty must be one number for each of the {count} samples, but has the shape {effort.shape}"
+            f"{' and holds NaN' if np.isnan(effort).any() else ''}."
+        )
+    return np.argsort(-effort, kind="stable")
+
+
+def traits(function: Callable[..., Any], row: Any) -> Traits:
+    """What the program of a function tells, from one sample; known again for the same function and shapes."""
+    leaves, structure = jax.tree.flatten((function, row))
+    shapes = [(np.shape(leaf), np.asarray(leaf).dtype.str) if _is_number(leaf) else leaf for leaf in leaves]
+    try:
+        return _traits(_Asked((structure, *shapes), function, row))
+    except TypeError as error:
+        if "unhashable" not in str(error):
+            raise
+        return _look(function, row)
+
+
+class _Asked:
+    """A function and a sample that are the same as others of one structure."""
+
+    def __init__(self, key: Any, function: Callable[..., Any], row: Any) -> None:
+        self.key, self.function, self.row = key, function, row
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Asked) and self.key == other.key
+
+
+@functools.lru_cache(maxsize=64)
+def _traits(asked: _Asked) -> Traits:
+    return _look(asked.function, asked.row)
+
+
+def _look(function: Callable[..., Any], row: Any) -> Traits:
+    program = traced(function, jax.tree.map(jax.numpy.asarray, row))
+    equations = list(equations_of(program))
+    sizes = [_size(variable.aval) for equation in equations for variable in equation.outvars]
+    loops = any(equation.primitive.name in ("while", "scan") for equation in equations)
+    return Traits(mentions_lapack(program), loops, max(sizes, default=8))
+
+
+def automatic_width(count: int, known: Traits | None) -> int:
+    """Samples in a chunk. The same on every machine with one kind of device, whatever else it does meanwhile.
+
+    Args:
+        count: number of samples.
+        known: traits of the program; None for functions that are not compiled, which are called sample by sample.
+    """
+    if known is None:
+        return max(1, count // 1000)
+    widest = WIDEST if known.loops else WIDEST_WITHOUT_LOOPS
+    if jax.default_backend() != "cpu":
+        widest = WIDEST_ON_ACCELERATOR
+    least = min(32, _power_of_two(count))
+    wanted = min(widest, max(least, _power_of_two(-(-count // 8))))
+    fitting = 2 ** int(np.log2(max(1, _BYTES // max(1, known.bytes))))
+    return min(wanted, fitting)
+
+
+def streams(known: Traits | None) -> int:
+    """Chunks that run side by side in this process: one for each device, or else for each core."""
+    if known is None or known.lapack:
+        return 1
+    if jax.local_device_count() > 1:
+        return jax.local_device_count()
+    return (os.cpu_count() or 1) if jax.default_backend() == "cpu" else 1
+
+
+def _is_number(leaf: Any) -> bool:
+    return isinstance(leaf, np.ndarray | np.generic | jax.Array)
+
+
+def _power_of_two(number: int) -> int:
+    return 1 << max(0, number - 1).bit_length()
+
+
+def _size(aval: Any) -> int:
+    return int(np.prod(getattr(aval, "shape", ()), dtype=float)) * getattr(getattr(aval, "dtype", None), "itemsize", 8)

@@ -1,0 +1,113 @@
+"""Running the chunks of a batch: several at a time, in threads of this process or on an executor."""
+
+import contextlib
+import queue
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from typing import Any
+
+import jax
+
+from twin._batch_kernel import Computed
+from twin._batch_worker import Failed
+
+_AHEAD = 32
+"""Chunks given to an executor that does not say how many workers it has."""
+
+Submit = Callable[[int], "Future[Any]"]
+Keep = Callable[[int, Computed], None]
+
+
+class ExecutorDied(RuntimeError):
+    """An executor that lost its workers, or was shut down."""
+
+
+def run_chunks(chunks: Sequence[int], submit: Submit, keep: Keep, *, window: int, first_alone: bool) -> None:
+    """Run chunks and hand on the results as they come, never more than a window of them at a time.
+
+    Args:
+        chunks: their numbers.
+        submit: starts one.
+        keep: takes the results of one; called in this thread alone.
+        window: chunks that are started or wait.
+        first_alone: wait for the first chunk before the others are started, as it compiles the program.
+
+    Raises:
+        ExecutorDied: the executor can do no more. What it had done is kept.
+    """
+    left = iter(chunks)
+    pending: dict[Future[Any], int] = {}
+    allowed = 1 if first_alone else window
+    try:
+        while True:
+            while len(pending) < allowed and (chunk := next(left, None)) is not None:
+                pending[_started(submit, chunk)] = chunk
+            if not pending:
+                return
+            for future in wait(pending, return_when=FIRST_COMPLETED).done:
+                keep(pending.pop(future), _result(future))
+            allowed = window
+    except BaseException:
+        _collect(pending, keep)
+        raise
+
+
+def _started(submit: Submit, chunk: int) -> "Future[Any]":
+    try:
+        return submit(chunk)
+    except RuntimeError as error:  # a pool that is broken or shut down
+        raise ExecutorDied(str(error)) from error
+
+
+def _result(future: "Future[Any]") -> Computed:
+    try:
+        found = future.result()
+    # What the function itself raises comes back as a value, so this is the executor's.
+    except Exception as error:
+        raise ExecutorDied(f"{type(error).__name__}: {error}") from error
+    if isinstance(found, Failed):
+        raise found.error
+    return found
+
+
+def _collect(pending: "dict[Future[Any], int]", keep: Keep) -> None:
+    """Keep what is done already; a second error must not hide the first."""
+    for future, chunk in pending.items():
+        future.cancel()
+        if future.done() and not future.cancelled() and future.exception() is None:
+            found = future.result()
+            if not isinstance(found, Failed):
+                with contextlib.suppress(Exception):
+                    keep(chunk, found)
+
+
+def window_of(executor: Executor) -> int:
+    """Chunks to hand to an executor ahead of time."""
+    workers = getattr(executor, "_max_workers", None)
+    return 2 * workers if isinstance(workers, int) and workers > 0 else _AHEAD
+
+
+@contextlib.contextmanager
+def local_threads(count: int) -> Iterator[ThreadPoolExecutor]:
+    """Threads of this process, each with a device of its own where there are several.
+
+    When they are left early, the chunks that run are waited for.
+
+    Args:
+        count: number of threads.
+    """
+    devices: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    for device in jax.local_devices() if jax.local_device_count() > 1 else []:
+        devices.put(device)
+
+    def begin() -> None:
+        # A thread does not inherit what its starter set for a while.
+        jax.enable_x64(True).__enter__()
+        if not devices.empty():
+            jax.default_device(devices.get()).__enter__()
+
+    pool = ThreadPoolExecutor(count, initializer=begin)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)

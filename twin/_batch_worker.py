@@ -1,0 +1,73 @@
+"""What a worker of an executor does with a chunk. A worker keeps the programs that it has compiled."""
+
+import functools
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from twin._batch_kernel import Computed, compute
+from twin._checks import InputError
+from twin._fingerprint import versions
+
+
+class Failed(NamedTuple):
+    """An error of the function itself, which is to be told from one of the executor."""
+
+    error: Exception
+
+
+def compute_here(fn: Any, mode: str, rows: Any, good: np.ndarray, width: int) -> Computed | Failed:
+    """Compute a chunk in a thread of this process; arguments as of `twin._batch_kernel.compute`."""
+    try:
+        return compute(fn, mode, rows, good, width)
+    except Exception as error:
+        return Failed(error)
+
+
+def compute_remotely(payload: bytes, rows: Any, good: np.ndarray, width: int) -> Computed | Failed:
+    """Compute a chunk in a worker.
+
+    Args:
+        payload: function, mode and versions, see `packed_job`.
+        rows: the samples of the chunk.
+        good: which of them are to be computed.
+        width: samples that are computed at once.
+    """
+    try:
+        fn, mode, expected = _job(payload)
+        for name, version in expected.items():
+            if versions().get(name) != version:
+                raise InputError(
+                    f"A worker has {name} {versions().get(name)}, but the study {version}. "
+                    "Start the workers from the same environment."
+                )
+        # A worker may belong to a program that works in single precision.
+        with jax.enable_x64(True):
+            return compute_here(fn, mode, rows, good, width)
+    except Exception as error:
+        return Failed(error)
+
+
+def packed_job(fn: Any, mode: str) -> bytes:
+    """A function as bytes for workers that were started anew; also one of a notebook.
+
+    Raises:
+        InputError: a function that cannot be sent.
+    """
+    import cloudpickle
+
+    try:
+        return cloudpickle.dumps((fn, mode, versions()))
+    except Exception as error:
+        raise InputError(
+            f"The function cannot be sent to workers ({type(error).__name__}: {error}). Give a plain function or a "
+            "module of arrays, without open files, locks or compiled functions inside."
+        ) from error
+
+
+@functools.lru_cache(maxsize=8)
+def _job(payload: bytes) -> tuple[Any, str, dict[str, str]]:
+    import cloudpickle
+
+    return cloudpickle.loads(payload)

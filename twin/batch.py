@@ -1,0 +1,206 @@
+"""One function at many samples: what-if sweeps, sensitivity studies and many starts, fast, resumable, on any executor.
+
+Every study runs here: chunks of one shape, compiled once, several at a time; results, status and wall time for each
+sample; kept on the disk where there is a store, so that a study that was killed goes on where it was.
+"""
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import ArrayLike, Float
+
+from twin._batch_keep import AbstractKept, InMemory, OnDisk, facts_of
+from twin._batch_kernel import MODES, VMAP, Computed
+from twin._batch_plan import Plan, as_samples, automatic_width, ordered, rows_of, streams, traits, whole_rows
+from twin._batch_run import ExecutorDied, local_threads, run_chunks, window_of
+from twin._batch_worker import compute_here, compute_remotely, packed_job
+from twin._checks import InputError, require_x64
+from twin.batch_result import NOT_FINITE, RAISED, BatchResult, statuses
+from twin.store import StoredChunk
+
+_NARROW = 8
+"""Samples computed at once in the second try: few, as they take long."""
+_HOPELESS = 20
+"""Samples that raised, while none was computed, after which a batch is given up."""
+
+
+class StudyInterrupted(RuntimeError):
+    """A study that could not go on; the message says what is kept and how to go on."""
+
+
+def batched(
+    fn: Callable[..., Any],
+    samples: Any,
+    *,
+    chunk_size: int | str = "auto",
+    store: str | Path | None = None,
+    executor: Executor | None = None,
+    progress: bool = True,
+    difficulty: Float[ArrayLike, "samples"] | None = None,
+    seed: int | None = None,
+    mode: str = VMAP,
+    retry: Callable[..., Any] | None = None,
+) -> BatchResult:
+    """Compute a function at many samples.
+
+    Neither chunk size nor order nor executor changes a result: with constant steps to 1e-12, with adaptive ones within
+    their tolerance, as their steps depend a little on what is computed beside. The same call on the same kind of
+    machine gives the same bits. A sample that fails is marked, and leaves the others as they are.
+
+    Args:
+        fn: JAX function of one sample that returns a number, an array, or several by name (dict, NamedTuple, module).
+            It may be a module, or a `functools.partial` of one; then its arrays can change without compiling anew.
+        samples: array with one row for each sample, any structure of such arrays, or a table of columns. `fn` gets one
+            row of it, in the same structure. A sample that holds NaN is marked and not computed; infinity passes.
+        chunk_size: samples computed at once. "auto": 256 on a processor, less for short studies and large arrays, more
+            where no sample can take longer than another and on accelerators. The last chunk is filled up.
+        store: folder that keeps each chunk as it is done. Called again with the same function and samples, the study
+            goes on where it was.
+        executor: anything like `concurrent.futures.Executor`: `twin.executors.local_processes()`,
+            `dask.distributed.Client(...).get_executor()`, `mpi4py.futures.MPIPoolExecutor()`. None: threads of this
+            process, one for each core or accelerator.
+        progress: show a bar with rate and remaining time, if it takes longer than a second.
+        difficulty: expected effort for each sample, in any unit: samples of like effort share a chunk, the hardest
+            first, so that quick ones do not wait for slow ones.
+        seed: what the samples were drawn with; kept in the store.
+        mode: "vmap": `fn` is compiled for a whole chunk; "loop": `fn` is called for one sample after the other, as
+            Python is, and may do anything, such as a fit; "chunk": `fn` is called with the rows of a chunk at once.
+        retry: function that stands in for `fn` where an output is not finite: the same with more steps, say. Those
+            samples are computed again after the others, a few at a time, so that none holds up a whole chunk for long.
+
+    Returns:
+        Outputs, status and wall time of each sample, in the order of the samples.
+
+    Raises:
+        InputError: 64-bit mode off, samples of unequal length, an unknown mode, a chunk size below one, a function that
+            is none or that returns no numbers, a store that holds another study, twenty samples that all raise.
+        StudyInterrupted: the executor died, or the store cannot be written, for instance as the disk is full.
+        KeyboardInterrupt: after Ctrl-C, when the chunks that were done are stored.
+    """
+    require_x64()
+    _check(fn, chunk_size, executor, mode, retry)
+    samples, count = as_samples(samples)
+    fn, retry = _as_tree(fn), None if retry is None else _as_tree(retry)
+    order, good = ordered(difficulty, count), whole_rows(samples, count)
+    known = traits(fn, jax.tree.map(lambda leaf: leaf[np.argmax(good)], samples)) if mode == VMAP else None
+    asked = None if chunk_size == "auto" else int(chunk_size)
+    width = min(asked, count) if asked else automatic_width(count, known)
+    with _interruptions_explained() as kept_by:
+        if store is None:
+            kept: AbstractKept = InMemory(samples, count, width)
+        else:
+            facts = facts_of(fn, retry, samples, count, order, seed, mode)
+            kept = OnDisk(Path(store), samples, count, width, facts, asked=asked and width)
+        kept_by.append(kept)
+        plan = Plan(order, kept.width)
+        run = partial(_run, samples, good, kept, executor, mode, streams(known), progress)
+        run(fn, plan, 0)
+        if retry is not None and (again := np.flatnonzero(kept.status() == NOT_FINITE)).size:
+            run(retry, Plan(again, min(_NARROW, kept.width)), plan.chunks)
+        return kept.result()
+
+
+def _check(fn: Any, chunk_size: Any, executor: Any, mode: str, retry: Any) -> None:
+    for name, function in (("fn", fn), ("retry", retry)):
+        if not callable(function) and not (name == "retry" and function is None):
+            raise InputError(f"{name} must be a function of one sample, but is {type(function).__name__}.")
+    if mode not in MODES:
+        raise InputError(f"mode must be one of {', '.join(map(repr, MODES))}, but is {mode!r}.")
+    if chunk_size != "auto" and (isinstance(chunk_size, str | float | bool) or int(chunk_size) < 1):
+        raise InputError(f"chunk_size must be 'auto' or a whole number of at least 1, but is {chunk_size!r}.")
+    if executor is not None and hasattr(executor, "get_executor"):
+        raise InputError("executor is a client of dask; give its client.get_executor().")
+    if executor is not None and not callable(getattr(executor, "submit", None)):
+        raise InputError(
+            f"executor must be like concurrent.futures.Executor, but {type(executor).__name__} has no submit()."
+        )
+
+
+def _as_tree(fn: Callable[..., Any]) -> Callable[..., Any]:
+    """With the arguments of a partial function as arrays that a compiled program takes, where it would hold them."""
+    return jax.tree_util.Partial(fn.func, *fn.args, **fn.keywords) if isinstance(fn, partial) else fn
+
+
+def _run(
+    samples: Any,
+    good: np.ndarray,
+    kept: AbstractKept,
+    executor: Executor | None,
+    mode: str,
+    threads: int,
+    progress: bool,
+    fn: Callable[..., Any],
+    plan: Plan,
+    offset: int,
+) -> None:
+    """Compute the chunks of a plan that are not there yet; they are numbered from an offset on."""
+    left = [chunk for chunk in range(plan.chunks) if offset + chunk not in kept.done()]
+    if not left:
+        return
+    hopeless = _Hopeless()
+    with contextlib.ExitStack() as stack:
+        total = len(plan.order)
+        bar = stack.enter_context(_bar(total, total - sum(len(plan.members(c)) for c in left), progress))
+        if executor is None:
+            pool = stack.enter_context(local_threads(threads))
+            start, window = partial(pool.submit, partial(compute_here, fn, mode)), threads + 1
+        else:
+            there = partial(compute_remotely, packed_job(fn, mode))
+            start, window = partial(executor.submit, there), window_of(executor)
+
+        def submit(chunk: int) -> "Future[Any]":
+            members = plan.members(chunk)
+            return start(rows_of(samples, members), good[members], plan.width)
+
+        def keep(chunk: int, done: Computed) -> None:
+            members = plan.members(chunk)
+            status = statuses(done.values, good[members], done.raised)
+            messages = {int(members[row]): text for row, text in done.raised.items()}
+            kept.write(offset + chunk, StoredChunk(members, status, done.seconds, done.values, messages))
+            bar.update(len(members))
+            hopeless.look(status, messages)
+
+        run_chunks(left, submit, keep, window=window, first_alone=executor is None)
+
+
+class _Hopeless:
+    """Gives a batch up in which every sample raises, as its function is wrong and not its samples."""
+
+    def __init__(self) -> None:
+        self._raised = 0
+
+    def look(self, status: np.ndarray, messages: dict[int, str]) -> None:
+        """Look at a chunk."""
+        raised = int(np.count_nonzero(status == RAISED))
+        self._raised = self._raised + raised if raised == len(status) and self._raised >= 0 else -1
+        if self._raised >= _HOPELESS:
+            raise InputError(
+                f"None of the first {self._raised} samples could be computed. The first said: {messages[min(messages)]}"
+            )
+
+
+def _bar(total: int, done: int, progress: bool) -> Any:
+    from tqdm.auto import tqdm
+
+    # In a file, each change of a bar is a new line.
+    every = 0.1 if sys.stderr.isatty() or "ipykernel" in sys.modules else 30.0
+    return tqdm(total=total, initial=done, unit=" samples", delay=1.0, mininterval=every, disable=not progress)
+
+
+@contextlib.contextmanager
+def _interruptions_explained() -> Iterator[list[AbstractKept]]:
+    """Errors of the executor and of the disk say what is kept."""
+    kept: list[AbstractKept] = []
+    try:
+        yield kept
+    except (ExecutorDied, OSError) as error:
+        what = "The executor died" if isinstance(error, ExecutorDied) else "The store cannot be written"
+        told = kept[0].told() if kept else "Nothing was computed."
+        raise StudyInterrupted(f"{what} ({error}). {told}") from error

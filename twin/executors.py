@@ -1,0 +1,39 @@
+"""Executors for batches: worker processes of this machine. Those of clusters come from dask.distributed or mpi4py."""
+
+import multiprocessing
+import os
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any
+
+from twin._loop_option import make_small_loops_one_function
+
+
+def local_processes(workers: int | None = None) -> ProcessPoolExecutor:
+    """Worker processes, started anew, each held on a core of its own.
+
+    In a script, make them below `if __name__ == "__main__":`, as every worker reads the script.
+
+    Args:
+        workers: number of processes; that of the cores if not given.
+
+    Returns:
+        The pool; use it in a `with` statement, or shut it down.
+
+    Raises:
+        InputError: fewer than one.
+    """
+    cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
+    count = len(cores) if workers is None else workers
+    context = multiprocessing.get_context("spawn")
+    turn = context.Queue()
+    for number in range(count):
+        turn.put(cores[number % len(cores)])
+    return ProcessPoolExecutor(count, mp_context=context, initializer=_begin, initargs=(turn,))
+
+
+def _begin(turn: Any) -> None:
+    """Hold the process on one core before JAX counts them for its threads, and compile as the command line does."""
+    core = turn.get()
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {core})
+    make_small_loops_one_function()

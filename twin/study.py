@@ -1,0 +1,153 @@
+"""Reading a study from its folder, also while it runs."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from twin.batch_result import DONE, STATUS, WAITING, BatchResult, blank
+from twin.store import Store, StoredChunk
+
+
+class StudyStatus(NamedTuple):
+    """How far a study is."""
+
+    folder: Path
+    """Its folder."""
+    function: str
+    """Name of its function."""
+    counts: dict[str, int]
+    """Samples by what became of them, see `twin.batch_result.STATUS`."""
+    chunks: tuple[int, int]
+    """Chunks that are there, and those of the whole study without a second try."""
+    damaged: int
+    """Chunks that do not agree with their checksum; they are computed again when the study goes on."""
+    seconds: float
+    """Computing time of the samples that are there [s]."""
+    versions: dict[str, str]
+    """Versions of what computed it."""
+
+    def __str__(self) -> str:
+        total, waiting = sum(self.counts.values()), self.counts[STATUS[WAITING]]
+        lines = [
+            f"Study of {self.function} in {self.folder}",
+            f"{total - waiting:,} of {total:,} samples ({self.chunks[0]:,} of {self.chunks[1]:,} chunks), "
+            f"{self.seconds:.3g} s of computing",
+        ]
+        lines += [
+            f"  {name.replace('_', ' ')}: {count:,}"
+            for name, count in self.counts.items()
+            if count and name not in (STATUS[WAITING], STATUS[DONE])
+        ]
+        if self.damaged:
+            lines.append(f"  damaged chunks: {self.damaged}; they are computed again when the study goes on")
+        lines.append("  " + ", ".join(f"{name} {version}" for name, version in self.versions.items()))
+        lines.append("Complete." if not waiting else "The same call with the same store goes on.")
+        return "\n".join(lines)
+
+
+def read_study(folder: str | Path) -> BatchResult:
+    """The results of a study that are there, also while it runs elsewhere.
+
+    Args:
+        folder: what was given as `store`.
+
+    Returns:
+        Results of all samples; those not computed yet are "waiting" and hold NaN. Outputs are read when asked for.
+
+    Raises:
+        InputError: no study there, or its manifest or its samples are damaged.
+    """
+    store = Store.open(folder)
+    gathered = gathered_from(store, only=())
+    return BatchResult(StoredOutputs(store), gathered.status, gathered.seconds, gathered.messages, store.samples())
+
+
+def study_status(folder: str | Path) -> StudyStatus:
+    """How far a study is; reads every chunk and checks it.
+
+    Raises:
+        InputError: no study there, or its manifest is damaged.
+    """
+    store = Store.open(folder)
+    gathered = gathered_from(store, only=())
+    number = np.bincount(gathered.status, minlength=len(STATUS))
+    size = int(store.manifest["chunks"]["size"])
+    return StudyStatus(
+        store.folder,
+        store.manifest["function"]["name"],
+        dict(zip(STATUS, number.tolist(), strict=True)),
+        (gathered.chunks, -(-store.count // size)),
+        gathered.damaged,
+        float(gathered.seconds.sum()),
+        store.manifest["versions"],
+    )
+
+
+class Gathered:
+    """Chunks put together."""
+
+    def __init__(self, count: int, only: tuple[str, ...] | None = None) -> None:
+        self.status = np.full(count, WAITING, dtype=np.int8)
+        self.seconds = np.zeros(count)
+        self.messages: dict[int, str] = {}
+        self.outputs: dict[str, np.ndarray] = {}
+        self.chunks = self.damaged = 0
+        self._only = only
+
+    def add(self, content: StoredChunk) -> None:
+        """Put the samples of a chunk in their places."""
+        numbers = content.numbers
+        self.chunks += 1
+        self.status[numbers] = content.status
+        # A sample tried again took the time of both.
+        self.seconds[numbers] += content.seconds
+        for number in numbers.tolist():
+            self.messages.pop(number, None)
+        self.messages |= content.messages
+        for name, values in content.values.items():
+            if self._only is None or name in self._only:
+                if name not in self.outputs:
+                    self.outputs[name] = blank(len(self.status), values)
+                self.outputs[name][numbers] = values
+
+
+class StoredOutputs(Mapping[str, np.ndarray]):
+    """Outputs of a study by name, read from its chunks when asked for."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        found = gathered_from(self._store, only=(name,)).outputs
+        if name not in found:
+            raise KeyError(name)
+        return found[name]
+
+    def __iter__(self) -> Iterator[str]:
+        for file in self._store.files().values():
+            content = self._store.read(file)
+            if content is not None and content.values:
+                return iter(content.values)
+        return iter(())
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
+
+
+def gathered_from(store: Store, only: tuple[str, ...] | None = None) -> Gathered:
+    """All chunks of a store that are whole.
+
+    Args:
+        store: the store.
+        only: names of the outputs wanted; None for all.
+    """
+    gathered = Gathered(store.count, only)
+    for _, file in sorted(store.files().items()):
+        content = store.read(file)
+        if content is None:
+            gathered.damaged += 1
+        else:
+            gathered.add(content)
+    return gathered

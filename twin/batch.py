@@ -2,6 +2,19 @@
 
 Every study runs here: chunks of one shape, compiled once, several at a time; results, status and wall time for each
 sample; kept on the disk where there is a store, so that a study that was killed goes on where it was.
+
+A store goes on with the same study alone. It is told by the function (its code, what it is closed over, the globals and
+the functions that it uses, the arrays of a module; comments do not count), the samples, their order, the seed, and the
+versions of what computes; what was changed is named. One process computes a store at a time; any may read it.
+
+Executors:
+    threads of this process, one for each core or accelerator: nothing to give.
+    worker processes: `with local_processes() as pool: batched(..., executor=pool)`, from `twin.executors`.
+    dask: `batched(..., executor=client.get_executor())`; workers that are lost are replaced by dask.
+    MPI: `mpiexec -n 9 python -m mpi4py.futures script.py`, which calls `batched(..., executor=MPIPoolExecutor())` below
+    `if __name__ == "__main__":`; one process hands out the chunks, eight compute.
+
+Workers must have the same versions, and be able to import the module that the function is in.
 """
 
 import contextlib
@@ -83,7 +96,8 @@ def batched(
         InputError: 64-bit mode off, samples of unequal length, an unknown mode, a chunk size below one, a function that
             is none or that returns no numbers, a store that holds another study, twenty samples that all raise.
         StudyInterrupted: the executor died, or the store cannot be written, for instance as the disk is full.
-        KeyboardInterrupt: after Ctrl-C, when the chunks that were done are stored.
+        KeyboardInterrupt: after Ctrl-C, when the chunks that were done, or are so within three seconds, are stored. A
+            thread that computes a longer one comes to its end before the program does.
     """
     require_x64()
     _check(fn, chunk_size, executor, mode, retry)

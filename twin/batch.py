@@ -32,15 +32,24 @@ from jaxtyping import ArrayLike, Float
 from twin._batch_facts import facts_of
 from twin._batch_keep import AbstractKept, InMemory, OnDisk, StoreFailed
 from twin._batch_kernel import MODES, VMAP, Computed
-from twin._batch_plan import Plan, Traits, as_samples, automatic_width, ordered, rows_of, streams, traits, whole_rows
+from twin._batch_plan import (
+    Plan,
+    Traits,
+    as_samples,
+    automatic_width,
+    ordered,
+    rows_of,
+    second_width,
+    streams,
+    traits,
+    whole_rows,
+)
 from twin._batch_run import ExecutorDied, local_threads, run_chunks, window_of
 from twin._batch_worker import compute_here, compute_remotely, packed_job
 from twin._checks import InputError, require_x64
 from twin.batch_result import NOT_FINITE, RAISED, BatchResult, statuses
 from twin.store import StoredChunk
 
-_NARROW = 8
-"""Samples computed at once in the second try: few, as they take long."""
 _HOPELESS = 20
 """Samples that raised, while none was computed, after which a batch is given up."""
 
@@ -108,16 +117,15 @@ def batched(
     asked = None if chunk_size == "auto" else int(chunk_size)
     width = min(asked, count) if asked else automatic_width(count, known)
     with contextlib.ExitStack() as stack:
-        kept = _kept(
-            store, partial(facts_of, fn, retry, samples, count, order, seed, mode), samples, count, width, asked
-        )
+        facts = partial(facts_of, fn, retry, samples, count, order, seed, mode)
+        kept = _kept(store, facts, samples, count, width, asked)
         stack.callback(kept.close)
         stack.enter_context(_interruptions_explained(kept))
         plan = Plan(order, kept.width)
         run = partial(_run, samples, good, kept, executor, mode, known, progress)
         run(fn, plan, 0)
         if retry is not None and (again := np.flatnonzero(kept.status(plan.chunks) == NOT_FINITE)).size:
-            run(retry, Plan(again, min(_NARROW, kept.width)), plan.chunks)
+            run(retry, Plan(again, second_width(kept.width)), plan.chunks)
         return kept.result()
 
 

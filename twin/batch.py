@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from twin._batch_keep import AbstractKept, InMemory, OnDisk, facts_of
-from twin._batch_kernel import MODES, VMAP, Computed
+from twin._batch_kernel import MODES, VMAP, Computed, of_one
 from twin._batch_plan import Plan, as_samples, automatic_width, ordered, rows_of, streams, traits, whole_rows
 from twin._batch_run import ExecutorDied, local_threads, run_chunks, window_of
 from twin._batch_worker import compute_here, compute_remotely, packed_job
@@ -89,7 +89,7 @@ def batched(
     samples, count = as_samples(samples)
     fn, retry = _as_tree(fn), None if retry is None else _as_tree(retry)
     order, good = ordered(difficulty, count), whole_rows(samples, count)
-    known = traits(fn, jax.tree.map(lambda leaf: leaf[np.argmax(good)], samples)) if mode == VMAP else None
+    known = traits(of_one, fn, jax.tree.map(lambda leaf: leaf[np.argmax(good)], samples)) if mode == VMAP else None
     asked = None if chunk_size == "auto" else int(chunk_size)
     width = min(asked, count) if asked else automatic_width(count, known)
     with _interruptions_explained() as kept_by:

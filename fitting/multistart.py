@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
-from scipy import stats
 
 from fitting.constraints import AbstractConstraint, all_constraints, check_constraints
 from fitting.fit import check_residual, chosen_solver, result_of
@@ -194,7 +193,9 @@ def multistart(
         """Cost up to which a fit is kept."""
         if keep != "consistent":
             return np.inf if keep == "all" else best
-        reach = float(stats.chi2.ppf(0.95, len(space)))
+        from scipy import special
+
+        reach = float(special.chdtri(len(space), 0.05))
         return best + 0.5 * reach if variance == "known" else best * (1 + reach / max(rows - len(space), 1))
 
     bounds = [np.tile(np.asarray(side), (len(vectors), 1)) for side in (space.lower, space.upper)]

@@ -86,7 +86,7 @@ class Sweep:
         dims = tuple(p.path for p in self.parameters) if self.grid else (_POINT,)
         coordinates = {}
         for axis, (parameter, values) in enumerate(zip(self.parameters, self.values, strict=True)):
-            about = {"long_name": parameter.path, "units": parameter.unit}
+            about: dict[str, str | float] = {"long_name": parameter.path, "units": parameter.unit}
             if self.relative:
                 about = {"long_name": self.axis_label(axis), "units": ""}
             about["present"] = self.present[axis]

@@ -1,6 +1,5 @@
 """Which samples of a batch are computed together: chunks of one shape, in an order."""
 
-import os
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -8,6 +7,7 @@ import jax
 import numpy as np
 
 from twin._checks import InputError
+from twin._cores import usable_cores
 from twin._lapack import equations_of, mentions_lapack, traced
 
 WIDEST = 256
@@ -150,7 +150,7 @@ def streams(known: Traits | None) -> int:
         return 1
     if jax.local_device_count() > 1:
         return jax.local_device_count()
-    return (os.cpu_count() or 1) if jax.default_backend() == "cpu" else 1
+    return len(usable_cores()) if jax.default_backend() == "cpu" else 1
 
 
 def _power_of_two(number: int) -> int:

@@ -5,6 +5,7 @@ import os
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
+from twin._cores import usable_cores
 from twin._loop_option import make_small_loops_one_function
 
 
@@ -22,7 +23,7 @@ def local_processes(workers: int | None = None) -> ProcessPoolExecutor:
     Raises:
         InputError: fewer than one.
     """
-    cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
+    cores = usable_cores()
     count = len(cores) if workers is None else workers
     context = multiprocessing.get_context("spawn")
     turn = context.Queue()

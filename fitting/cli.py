@@ -11,10 +11,14 @@ from twin._loop_option import make_small_loops_one_function
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code: 0 done, 2 input that cannot be used.
+    """Run the command line.
 
     Args:
         arguments: command line without the program's name; the process's own if not given.
+
+    Returns:
+        The exit code: 0 done, 2 input that cannot be used, 3 a study that was interrupted and goes on with the same
+        command, 130 stopped by Ctrl-C.
     """
     options = _parser().parse_args(arguments)
     make_small_loops_one_function()
@@ -26,13 +30,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     jax.config.update("jax_enable_x64", True)
     use_compile_cache()
+    from twin.batch import StudyInterrupted
+
     try:
-        options.out.mkdir(parents=True, exist_ok=True)
+        if not options.reads:
+            options.out.mkdir(parents=True, exist_ok=True)
         print(options.run(options.out))
     except (InputError, OSError) as error:
-        print(f"drivetwin: {error}", file=sys.stderr)
-        return 2
+        return _told(str(error), 2)
+    except StudyInterrupted as error:
+        return _told(str(error), 3)
+    except KeyboardInterrupt:
+        return _told(
+            "stopped by Ctrl-C; what a study had stored is kept, and the same command goes on from there.", 130
+        )
     return 0
+
+
+def _told(message: str, code: int) -> int:
+    print(f"drivetwin: {message}", file=sys.stderr)
+    return code
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -55,6 +72,10 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(mauro, _mauro, "out/mauro")
     ellinger = studies.add_parser("ellinger", help="whole machine: sensitivities, 6,000 small problems, joint fit")
     _add_run(ellinger, _ellinger, "out/ellinger")
+    study = commands.add_parser("study", help="look after studies of many samples that are kept in a folder")
+    status = study.add_subparsers(required=True, metavar="ACTION").add_parser("status", help="how far a study is")
+    status.add_argument("out", type=Path, metavar="DIR", help="folder of the study")
+    status.set_defaults(run=_study_status, reads=True)
     return parser
 
 
@@ -62,10 +83,16 @@ def _add_run(parser: argparse.ArgumentParser, run: Callable[[Path], str], out: s
     parser.add_argument(
         "--out", type=Path, default=Path(out), metavar="DIR", help="folder for the results (%(default)s)"
     )
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, reads=False)
 
 
 # Imported when asked for: the command's help must not wait for JAX and matplotlib.
+def _study_status(folder: Path) -> str:
+    from twin.study import study_status
+
+    return str(study_status(folder))
+
+
 def _demo(out: Path) -> str:
     from fitting.demo import run_demo
 

@@ -1,20 +1,22 @@
 """Where the chunks of a batch are kept: in memory, or in a folder."""
 
 import abc
+import contextlib
 import warnings
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 
+from twin._batch_facts import require_same
+from twin._batch_plan import Plan
 from twin._checks import InputError
-from twin._fingerprint import function_digest, function_name, samples_digest, versions
 from twin._tree_names import leaf_name
 from twin.batch_result import BatchResult
-from twin.store import Store, StoredChunk
-from twin.study import Gathered, gathered_from, read_study
+from twin.store import Store, StoredChunk, claim
+from twin.study import Gathered, read_study
 
 
 class AbstractKept(abc.ABC):
@@ -24,24 +26,34 @@ class AbstractKept(abc.ABC):
     """Samples in a chunk."""
 
     @abc.abstractmethod
-    def done(self) -> set[int]:
-        """Numbers of the chunks that are there."""
+    def done(self, plan: Plan, offset: int) -> set[int]:
+        """Numbers of the chunks of a plan that are there, in the plan.
+
+        Args:
+            plan: the plan.
+            offset: number of its first chunk.
+        """
 
     @abc.abstractmethod
     def write(self, chunk: int, content: StoredChunk) -> None:
         """Keep a chunk.
 
         Raises:
-            OSError: it cannot be written.
+            InputError: its outputs have other names or shapes than those of chunks before.
+            StoreFailed: it cannot be written.
         """
 
     @abc.abstractmethod
-    def status(self) -> np.ndarray:
-        """What became of each sample so far (samples,)."""
+    def status(self, chunks: int) -> np.ndarray:
+        """What became of each sample in the first so many chunks (samples,)."""
 
     @abc.abstractmethod
     def result(self) -> BatchResult:
         """All that is there."""
+
+    @abc.abstractmethod
+    def close(self) -> None:
+        """Let go what it holds."""
 
     @abc.abstractmethod
     def told(self) -> str:
@@ -56,7 +68,7 @@ class InMemory(AbstractKept):
         self._samples = samples
         self._gathered = Gathered(count)
 
-    def done(self) -> set[int]:
+    def done(self, plan: Plan, offset: int) -> set[int]:
         """None."""
         return set()
 
@@ -64,8 +76,8 @@ class InMemory(AbstractKept):
         """Put it in its place."""
         self._gathered.add(content)
 
-    def status(self) -> np.ndarray:
-        """What became of each sample so far (samples,)."""
+    def status(self, chunks: int) -> np.ndarray:
+        """What became of each sample so far (samples,): the first chunks come first."""
         return self._gathered.status
 
     def result(self) -> BatchResult:
@@ -78,9 +90,12 @@ class InMemory(AbstractKept):
         """Nothing is left."""
         return "Nothing of the study is kept: give a folder as store, and it goes on where it was."
 
+    def close(self) -> None:
+        """It holds nothing."""
+
 
 class OnDisk(AbstractKept):
-    """Chunks in the folder of a study."""
+    """Chunks in the folder of a study, which it holds until it is closed."""
 
     def __init__(
         self, folder: Path, samples: Any, count: int, width: int, facts: dict[str, Any], *, asked: int | None
@@ -96,36 +111,75 @@ class OnDisk(AbstractKept):
             asked: samples in a chunk, if the caller asked for a number.
 
         Raises:
-            InputError: another study is there.
-            OSError: the folder cannot be written.
+            InputError: another study is there, or another process computes it.
+            StoreFailed: the folder cannot be written.
         """
-        manifest = {**facts, "chunks": {"size": width}}
-        if Store.is_in(folder):
-            self._store = Store.open(folder)
-            _require_same(self._store, facts, asked)
-        else:
-            self._store = Store.begin(folder, manifest, samples)
+        self._outlines: dict[int, StoredChunk] = {}
+        self._gathered = Gathered(count, only=())
+        with _disk_explained(), contextlib.ExitStack() as stack:
+            stack.enter_context(claim(folder))
+            warned = self._begin(folder, samples, {**facts, "chunks": {"size": width}}, asked)
+            damaged = [number for number, content in self._store.mended() if not self._is_whole(number, content)]
+            self._claim = stack.pop_all()
         self.width = int(self._store.manifest["chunks"]["size"])
-        whole, damaged = self._store.mend()
-        self._done = whole
         if damaged:
-            warnings.warn(
-                f"{len(damaged)} chunks of {folder} were damaged (the first is chunk {damaged[0]}) and are computed "
-                "again. If it happens again, look at the disk.",
-                stacklevel=4,
+            warned.append(
+                f"{len(damaged)} chunks were damaged (the first is chunk {damaged[0]}) and are computed again"
             )
+        for text in warned:
+            warnings.warn(f"{folder}: {text}. If it happens again, look at the disk.", stacklevel=4)
 
-    def done(self) -> set[int]:
-        """Numbers of the chunks that are whole."""
-        return self._done
+    def _begin(self, folder: Path, samples: Any, manifest: dict[str, Any], asked: int | None) -> list[str]:
+        if not Store.is_in(folder):
+            self._store = Store.begin(folder, manifest, samples)
+            return []
+        self._store = Store.open(folder)
+        require_same(self._store, manifest, asked)
+        try:
+            self._store.samples()
+        except InputError:
+            self._store.write_samples(samples)
+            return ["the samples were damaged and were written again"]
+        return []
+
+    def _is_whole(self, number: int, content: StoredChunk | None) -> bool:
+        if content is not None:
+            self._note(number, content)
+        return content is not None
+
+    def _note(self, number: int, content: StoredChunk) -> None:
+        # Without its values: they stay on the disk.
+        outline = content._replace(values={name: values[:0] for name, values in content.values.items()})
+        self._gathered.add(outline)
+        self._outlines[number] = outline
+
+    def done(self, plan: Plan, offset: int) -> set[int]:
+        """Numbers of the chunks that are there; those of other samples are removed."""
+        found = set()
+        for chunk in range(plan.chunks):
+            there = self._outlines.get(offset + chunk)
+            if there is not None and np.array_equal(there.numbers, plan.members(chunk)):
+                found.add(chunk)
+            elif there is not None:
+                with _disk_explained():
+                    self._store.remove(offset + chunk)
+                del self._outlines[offset + chunk]
+        return found
 
     def write(self, chunk: int, content: StoredChunk) -> None:
         """Write a chunk."""
-        self._store.write(chunk, content)
+        self._gathered.require_alike(content)
+        with _disk_explained():
+            self._store.write(chunk, content)
+        self._note(chunk, content)
 
-    def status(self) -> np.ndarray:
-        """What became of each sample so far (samples,)."""
-        return gathered_from(self._store, only=()).status
+    def status(self, chunks: int) -> np.ndarray:
+        """What became of each sample in the first so many chunks (samples,)."""
+        gathered = Gathered(self._store.count, only=())
+        for number, outline in self._outlines.items():
+            if number < chunks:
+                gathered.add(outline)
+        return gathered.status
 
     def result(self) -> BatchResult:
         """All that is there; outputs are read when asked for."""
@@ -133,66 +187,20 @@ class OnDisk(AbstractKept):
 
     def told(self) -> str:
         """Where the chunks are."""
-        return f"{len(self._store.files())} chunks are kept in {self._store.folder}; the same call goes on from there."
+        return f"{len(self._outlines)} chunks are kept in {self._store.folder}; the same call goes on from there."
+
+    def close(self) -> None:
+        """Let the folder go."""
+        self._claim.close()
 
 
-def facts_of(
-    fn: Callable[..., Any],
-    retry: Callable[..., Any] | None,
-    samples: Any,
-    count: int,
-    order: np.ndarray,
-    seed: int | None,
-    mode: str,
-) -> dict[str, Any]:
-    """What a study depends on, for its manifest."""
-    return {
-        "function": {"name": function_name(fn), "digest": function_digest(fn), "mode": mode},
-        "retry": None if retry is None else {"name": function_name(retry), "digest": function_digest(retry)},
-        "samples": {"count": count, "digest": samples_digest(samples)},
-        "order": samples_digest(order),
-        "seed": seed,
-        "dtype": "float64",
-        "versions": versions(),
-    }
+class StoreFailed(RuntimeError):
+    """A store that cannot be read or written."""
 
 
-def _require_same(store: Store, facts: dict[str, Any], asked: int | None) -> None:
-    """Raise unless the study in a folder is the one that is to go on."""
-    changed = list(_changes(store.manifest, facts))
-    size = store.manifest["chunks"]["size"]
-    if asked not in (None, size):
-        changed.append(f"chunk_size was {size} and is {asked} now")
-    if changed:
-        raise InputError(
-            f"{store.folder} holds another study: {'; '.join(changed)}. "
-            "Give another folder as store, or undo the change."
-        )
-
-
-def _changes(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
-    changes = []
-    for key, what in (("function", "the function"), ("retry", "the function of the second try")):
-        was, now = old.get(key) or {}, new[key] or {}
-        if was.get("name") != now.get("name"):
-            changes.append(f"{what} was {was.get('name', 'none')} and is {now.get('name', 'none')} now")
-        elif was != now:
-            changes.append(
-                f"{what} {now['name']} was changed: its source, the values that it is closed over, or its mode"
-            )
-    if old["samples"] != new["samples"]:
-        was, now = old["samples"]["count"], new["samples"]["count"]
-        changes.append(
-            f"there were {was:,} samples and are {now:,} now"
-            if was != now
-            else "the values of the samples were changed"
-        )
-    elif old.get("order") != new["order"]:
-        changes.append("difficulty was changed")
-    for key in ("seed", "dtype"):
-        if old.get(key) != new[key]:
-            changes.append(f"{key} was {old.get(key)} and is {new[key]} now")
-    for name, version in new["versions"].items():
-        if old.get("versions", {}).get(name) != version:
-            changes.append(f"{name} was {old.get('versions', {}).get(name)} and is {version} now")
-    return changes
+@contextlib.contextmanager
+def _disk_explained() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise StoreFailed(str(error)) from error

@@ -13,6 +13,8 @@ from twin._batch_worker import Failed
 
 _AHEAD = 32
 """Chunks given to an executor that does not say how many workers it has."""
+_PATIENCE = 3.0
+"""How long Ctrl-C waits for the chunks that run, so that they are not lost [s]."""
 
 Submit = Callable[[int], "Future[Any]"]
 Keep = Callable[[int, Computed], None]
@@ -34,6 +36,7 @@ def run_chunks(chunks: Sequence[int], submit: Submit, keep: Keep, *, window: int
 
     Raises:
         ExecutorDied: the executor can do no more. What it had done is kept.
+        KeyboardInterrupt: after Ctrl-C. What was done is kept, and what is done within a few seconds.
     """
     left = iter(chunks)
     pending: dict[Future[Any], int] = {}
@@ -47,8 +50,9 @@ def run_chunks(chunks: Sequence[int], submit: Submit, keep: Keep, *, window: int
             for future in wait(pending, return_when=FIRST_COMPLETED).done:
                 keep(pending.pop(future), _result(future))
             allowed = window
-    except BaseException:
-        _collect(pending, keep)
+    except BaseException as error:
+        patience = _PATIENCE if isinstance(error, KeyboardInterrupt) else 0.0
+        _collect(pending, keep, patience)
         raise
 
 
@@ -56,7 +60,7 @@ def _started(submit: Submit, chunk: int) -> "Future[Any]":
     try:
         return submit(chunk)
     except RuntimeError as error:  # a pool that is broken or shut down
-        raise ExecutorDied(str(error)) from error
+        raise ExecutorDied(f"{type(error).__name__}: {error}") from error
 
 
 def _result(future: "Future[Any]") -> Computed:
@@ -70,15 +74,15 @@ def _result(future: "Future[Any]") -> Computed:
     return found
 
 
-def _collect(pending: "dict[Future[Any], int]", keep: Keep) -> None:
-    """Keep what is done already; a second error must not hide the first."""
-    for future, chunk in pending.items():
-        future.cancel()
-        if future.done() and not future.cancelled() and future.exception() is None:
+def _collect(pending: "dict[Future[Any], int]", keep: Keep, patience: float) -> None:
+    """Keep what is done, or soon will be; a second error must not hide the first."""
+    running = [future for future in pending if not future.cancel()]
+    for future in wait(running, timeout=patience).done:
+        if not future.cancelled() and future.exception() is None:
             found = future.result()
             if not isinstance(found, Failed):
                 with contextlib.suppress(Exception):
-                    keep(chunk, found)
+                    keep(pending[future], found)
 
 
 def window_of(executor: Executor) -> int:
@@ -91,7 +95,7 @@ def window_of(executor: Executor) -> int:
 def local_threads(count: int) -> Iterator[ThreadPoolExecutor]:
     """Threads of this process, each with a device of its own where there are several.
 
-    When they are left early, the chunks that run are waited for.
+    When they are left early, the chunks that run come to their end beside what follows.
 
     Args:
         count: number of threads.
@@ -110,4 +114,4 @@ def local_threads(count: int) -> Iterator[ThreadPoolExecutor]:
     try:
         yield pool
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        pool.shutdown(wait=False, cancel_futures=True)

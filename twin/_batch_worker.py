@@ -1,6 +1,7 @@
 """What a worker of an executor does with a chunk. A worker keeps the programs that it has compiled."""
 
 import functools
+import pickle
 from typing import Any, NamedTuple
 
 import jax
@@ -35,18 +36,28 @@ def compute_remotely(payload: bytes, rows: Any, good: np.ndarray, width: int) ->
         width: samples that are computed at once.
     """
     try:
-        fn, mode, expected = _job(payload)
-        for name, version in expected.items():
-            if versions().get(name) != version:
-                raise InputError(
-                    f"A worker has {name} {versions().get(name)}, but the study {version}. "
-                    "Start the workers from the same environment."
-                )
-        # A worker may belong to a program that works in single precision.
+        # A worker may work in single precision, in which even the arrays of the function would be read.
         with jax.enable_x64(True):
-            return compute_here(fn, mode, rows, good, width)
+            fn, mode, expected = _job(payload)
+            for name, version in expected.items():
+                if versions().get(name) != version:
+                    raise InputError(
+                        f"A worker has {name} {versions().get(name)}, but the study {version}. "
+                        "Start the workers from the same environment."
+                    )
+            found = compute_here(fn, mode, rows, good, width)
     except Exception as error:
-        return Failed(error)
+        found = Failed(error)
+    return Failed(_sendable(found.error)) if isinstance(found, Failed) else found
+
+
+def _sendable(error: Exception) -> Exception:
+    """An error that cannot be read at the other end would end the executor."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error
 
 
 def packed_job(fn: Any, mode: str) -> bytes:
@@ -70,4 +81,10 @@ def packed_job(fn: Any, mode: str) -> bytes:
 def _job(payload: bytes) -> tuple[Any, str, dict[str, str]]:
     import cloudpickle
 
-    return cloudpickle.loads(payload)
+    try:
+        return cloudpickle.loads(payload)
+    except Exception as error:
+        raise InputError(
+            f"A worker cannot read the function ({type(error).__name__}: {error}). Put its module where the workers "
+            "can import it, on PYTHONPATH for instance, and start them from the same environment."
+        ) from error

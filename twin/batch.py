@@ -7,7 +7,7 @@ sample; kept on the disk where there is a store, so that a study that was killed
 import contextlib
 import sys
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,10 @@ import jax
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
-from twin._batch_keep import AbstractKept, InMemory, OnDisk, facts_of
+from twin._batch_facts import facts_of
+from twin._batch_keep import AbstractKept, InMemory, OnDisk, StoreFailed
 from twin._batch_kernel import MODES, VMAP, Computed, of_one
-from twin._batch_plan import Plan, as_samples, automatic_width, ordered, rows_of, streams, traits, whole_rows
+from twin._batch_plan import Plan, Traits, as_samples, automatic_width, ordered, rows_of, streams, traits, whole_rows
 from twin._batch_run import ExecutorDied, local_threads, run_chunks, window_of
 from twin._batch_worker import compute_here, compute_remotely, packed_job
 from twin._checks import InputError, require_x64
@@ -92,19 +93,27 @@ def batched(
     known = traits(of_one, fn, jax.tree.map(lambda leaf: leaf[np.argmax(good)], samples)) if mode == VMAP else None
     asked = None if chunk_size == "auto" else int(chunk_size)
     width = min(asked, count) if asked else automatic_width(count, known)
-    with _interruptions_explained() as kept_by:
-        if store is None:
-            kept: AbstractKept = InMemory(samples, count, width)
-        else:
-            facts = facts_of(fn, retry, samples, count, order, seed, mode)
-            kept = OnDisk(Path(store), samples, count, width, facts, asked=asked and width)
-        kept_by.append(kept)
+    with contextlib.ExitStack() as stack:
+        kept = _kept(
+            store, partial(facts_of, fn, retry, samples, count, order, seed, mode), samples, count, width, asked
+        )
+        stack.callback(kept.close)
+        stack.enter_context(_interruptions_explained(kept))
         plan = Plan(order, kept.width)
-        run = partial(_run, samples, good, kept, executor, mode, streams(known), progress)
+        run = partial(_run, samples, good, kept, executor, mode, known, progress)
         run(fn, plan, 0)
-        if retry is not None and (again := np.flatnonzero(kept.status() == NOT_FINITE)).size:
+        if retry is not None and (again := np.flatnonzero(kept.status(plan.chunks) == NOT_FINITE)).size:
             run(retry, Plan(again, min(_NARROW, kept.width)), plan.chunks)
         return kept.result()
+
+
+def _kept(
+    store: str | Path | None, facts: Callable[[], Any], samples: Any, count: int, width: int, asked: int | None
+) -> AbstractKept:
+    if store is None:
+        return InMemory(samples, count, width)
+    with _interruptions_explained(None):
+        return OnDisk(Path(store), samples, count, width, facts(), asked=asked and width)
 
 
 def _check(fn: Any, chunk_size: Any, executor: Any, mode: str, retry: Any) -> None:
@@ -134,14 +143,15 @@ def _run(
     kept: AbstractKept,
     executor: Executor | None,
     mode: str,
-    threads: int,
+    known: Traits | None,
     progress: bool,
     fn: Callable[..., Any],
     plan: Plan,
     offset: int,
 ) -> None:
     """Compute the chunks of a plan that are not there yet; they are numbered from an offset on."""
-    left = [chunk for chunk in range(plan.chunks) if offset + chunk not in kept.done()]
+    done = kept.done(plan, offset)
+    left = [chunk for chunk in range(plan.chunks) if chunk not in done]
     if not left:
         return
     hopeless = _Hopeless()
@@ -149,11 +159,13 @@ def _run(
         total = len(plan.order)
         bar = stack.enter_context(_bar(total, total - sum(len(plan.members(c)) for c in left), progress))
         if executor is None:
+            threads = streams(known)
             pool = stack.enter_context(local_threads(threads))
             start, window = partial(pool.submit, partial(compute_here, fn, mode)), threads + 1
         else:
             there = partial(compute_remotely, packed_job(fn, mode))
-            start, window = partial(executor.submit, there), window_of(executor)
+            alone = known is not None and known.lapack and isinstance(executor, ThreadPoolExecutor)
+            start, window = partial(executor.submit, there), 1 if alone else window_of(executor)
 
         def submit(chunk: int) -> "Future[Any]":
             members = plan.members(chunk)
@@ -195,12 +207,13 @@ def _bar(total: int, done: int, progress: bool) -> Any:
 
 
 @contextlib.contextmanager
-def _interruptions_explained() -> Iterator[list[AbstractKept]]:
+def _interruptions_explained(kept: AbstractKept | None) -> Iterator[None]:
     """Errors of the executor and of the disk say what is kept."""
-    kept: list[AbstractKept] = []
     try:
-        yield kept
-    except (ExecutorDied, OSError) as error:
-        what = "The executor died" if isinstance(error, ExecutorDied) else "The store cannot be written"
-        told = kept[0].told() if kept else "Nothing was computed."
-        raise StudyInterrupted(f"{what} ({error}). {told}") from error
+        yield
+    except (ExecutorDied, StoreFailed) as error:
+        dead = isinstance(error, ExecutorDied)
+        what = "The executor died" if dead else "The store cannot be read or written"
+        cure = " Give it a new executor." if dead else ""
+        told = kept.told() if kept else "Nothing was computed."
+        raise StudyInterrupted(f"{what} ({error}). {told}{cure}") from error

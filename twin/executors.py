@@ -2,9 +2,12 @@
 
 import multiprocessing
 import os
+import signal
+import threading
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
+from twin._checks import InputError
 from twin._cores import usable_cores
 from twin._loop_option import make_small_loops_one_function
 
@@ -25,6 +28,8 @@ def local_processes(workers: int | None = None) -> ProcessPoolExecutor:
     """
     cores = usable_cores()
     count = len(cores) if workers is None else workers
+    if count < 1:
+        raise InputError(f"workers must be a whole number of at least 1, but is {count}.")
     context = multiprocessing.get_context("spawn")
     turn = context.Queue()
     for number in range(count):
@@ -34,7 +39,18 @@ def local_processes(workers: int | None = None) -> ProcessPoolExecutor:
 
 def _begin(turn: Any) -> None:
     """Hold the process on one core before JAX counts them for its threads, and compile as the command line does."""
+    # Ctrl-C is for the parent, which keeps what is done; the terminal sends it to all.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     core = turn.get()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {core})
     make_small_loops_one_function()
+
+
+def _end_with_parent() -> None:
+    """A worker whose parent was killed would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -4,13 +4,18 @@ Every file is written aside and renamed, so that what has its name is whole, whe
 chunk holds the digest of its content: a byte that flips later is found when it is read. Nothing is pickled.
 """
 
+import contextlib
+import errno
 import hashlib
 import io
 import json
 import os
+import time
 import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import jax
 import numpy as np
@@ -19,8 +24,13 @@ from twin._checks import InputError
 from twin._tree_names import leaf_name
 
 _FORMAT = 1
-_MANIFEST, _SAMPLES, _ASIDE = "manifest.json", "samples.npz", ".partial"
-_VALUE, _SAMPLE = "value ", "sample "  # no name of an array can then be one of NumPy's arguments
+_MANIFEST, _SAMPLES, _CHUNKS, _LOCK, _ASIDE = "manifest.json", "samples.npz", "chunks", "lock", ".partial"
+_VALUE = "value "
+_ABOUT_SAMPLES = ("numbers", "status", "seconds")
+_DAMAGES = (OSError, ValueError, KeyError, TypeError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error)
+"""What reading a damaged file raises."""
+_TRIES, _PAUSE = 10, 0.2
+"""A process that was just killed lets its claim go a moment later [-, s]."""
 
 
 class StoredChunk(NamedTuple):
@@ -47,27 +57,17 @@ class Store:
 
     @classmethod
     def begin(cls, folder: Path, manifest: dict[str, Any], samples: Any) -> "Store":
-        """Make the folder of a new study.
+        """Write manifest and samples of a new study into a claimed folder.
 
         Raises:
-            InputError: a folder that holds anything else.
             OSError: it cannot be written.
         """
-        folder.mkdir(parents=True, exist_ok=True)
-        # What a study leaves that was killed while it began.
-        others = [f.name for f in folder.iterdir() if f.name not in (_SAMPLES, "chunks") and f.suffix != _ASIDE]
-        if others:
-            raise InputError(
-                f"{folder} holds {sorted(others)[0]!r}, but no study. Give a new or an empty folder as store."
-            )
-        (folder / "chunks").mkdir(exist_ok=True)
-        leaves = {
-            _SAMPLE + (leaf_name(p) or "samples"): leaf for p, leaf in jax.tree_util.tree_leaves_with_path(samples)
-        }
-        _write(folder / _SAMPLES, _packed(leaves))
-        manifest = {"format": _FORMAT, **manifest}
-        _write(folder / _MANIFEST, json.dumps(manifest, indent=2).encode())
-        return cls(folder, manifest)
+        (folder / _CHUNKS).mkdir(exist_ok=True)
+        store = cls(folder, {"format": _FORMAT, **manifest})
+        store.write_samples(samples)
+        text = json.dumps({**store.manifest, "checksum": _checksum(store.manifest)}, indent=2)
+        _write(folder / _MANIFEST, text.encode())
+        return store
 
     @classmethod
     def open(cls, folder: str | Path) -> "Store":
@@ -87,7 +87,8 @@ class Store:
                     f"{file} has the format {manifest['format']}, but this version reads {_FORMAT}. "
                     "Read it with the version that wrote it."
                 )
-            _ = manifest["function"]["name"], manifest["samples"]["count"], manifest["chunks"]["size"]
+            if manifest.pop("checksum") != _checksum(manifest):
+                raise ValueError("its checksum is wrong")
         except (ValueError, KeyError, TypeError) as error:
             if isinstance(error, InputError):
                 raise
@@ -113,10 +114,25 @@ class Store:
             InputError: the file is damaged.
         """
         try:
-            arrays = _unpacked((self.folder / _SAMPLES).read_bytes())
-            return {name.removeprefix(_SAMPLE): array for name, array in arrays.items()}
-        except (OSError, ValueError, zipfile.BadZipFile) as error:
-            raise InputError(f"The samples of {self.folder} cannot be read: {error}") from error
+            arrays, about = _unpacked((self.folder / _SAMPLES).read_bytes())
+            if about["digest"] != _digest(b"".join(array.tobytes() for array in arrays.values())):
+                raise ValueError("their checksum is wrong")
+        except _DAMAGES as error:
+            raise InputError(
+                f"The samples of {self.folder} cannot be read ({error}). The call that computes the study writes them "
+                "again."
+            ) from error
+        return arrays
+
+    def write_samples(self, samples: Any) -> None:
+        """Write the samples.
+
+        Raises:
+            OSError: no space left, or the folder is gone.
+        """
+        leaves = {leaf_name(p) or "samples": leaf for p, leaf in jax.tree_util.tree_leaves_with_path(samples)}
+        digest = _digest(b"".join(leaf.tobytes() for leaf in leaves.values()))
+        _write(self.folder / _SAMPLES, _packed(leaves, digest=digest))
 
     def write(self, chunk: int, content: StoredChunk) -> None:
         """Write a chunk.
@@ -124,71 +140,121 @@ class Store:
         Raises:
             OSError: no space left, or the folder is gone; what was written aside is removed.
         """
-        about = {"messages": {str(number): text for number, text in content.messages.items()}}
-        data = _packed(
-            {
-                "numbers": content.numbers,
-                "status": content.status,
-                "seconds": content.seconds,
-                "about": np.frombuffer(json.dumps(about).encode(), dtype=np.uint8),
-                **{f"{_VALUE}{name}": value for name, value in content.values.items()},
-            }
-        )
-        _write(self.folder / "chunks" / f"{chunk:07d}-{_digest(data)}.npz", data)
+        values = {f"{_VALUE}{name}": value for name, value in content.values.items()}
+        messages = {str(number): text for number, text in content.messages.items()}
+        data = _packed({**{name: getattr(content, name) for name in _ABOUT_SAMPLES}, **values}, messages=messages)
+        _write(self.folder / _CHUNKS / f"{chunk:07d}-{_digest(data)}.npz", data)
+
+    def remove(self, chunk: int) -> None:
+        """Remove a chunk, if it is there."""
+        file = self.files().get(chunk)
+        if file is not None:
+            file.unlink(missing_ok=True)
 
     def files(self) -> dict[int, Path]:
         """Files of the chunks that are there, by number; whether they are whole is not looked at."""
         found = {}
-        for file in sorted((self.folder / "chunks").glob("*-*.npz")):
+        for file in sorted((self.folder / _CHUNKS).glob("*-*.npz")):
             if file.name.split("-")[0].isdigit():
                 found.setdefault(int(file.name.split("-")[0]), file)
         return found
 
     def read(self, file: Path) -> StoredChunk | None:
-        """The content of a chunk's file; None where it is damaged."""
+        """The content of a chunk's file; None where it is damaged or gone.
+
+        Raises:
+            OSError: it cannot be read, which does not say that it is damaged.
+        """
         try:
             data = file.read_bytes()
             if file.stem.split("-")[1] != _digest(data):
                 return None
-            arrays = _unpacked(data)
-            about = json.loads(arrays["about"].tobytes())
-            return StoredChunk(
-                arrays["numbers"],
-                arrays["status"],
-                arrays["seconds"],
-                {name.removeprefix(_VALUE): array for name, array in arrays.items() if name.startswith(_VALUE)},
-                {int(number): text for number, text in about["messages"].items()},
-            )
-        except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+            arrays, about = _unpacked(data)
+            values = {n.removeprefix(_VALUE): array for n, array in arrays.items() if n.startswith(_VALUE)}
+            messages = {int(number): text for number, text in about["messages"].items()}
+            about_samples = {name: arrays[name] for name in _ABOUT_SAMPLES}
+            return StoredChunk(**about_samples, values=values, messages=messages)
+        except (FileNotFoundError, *_DAMAGES[1:]):
             return None
 
-    def mend(self) -> tuple[set[int], list[int]]:
-        """Remove what is damaged or was not finished.
-
-        Returns:
-            Numbers of the chunks that are whole, and of those that were damaged.
+    def mended(self) -> Iterator[tuple[int, StoredChunk | None]]:
+        """Number and content of each chunk; None in place of one that was damaged. Removes that, and what was not
+        finished; so it is for those alone who hold the claim.
         """
-        for left in [*self.folder.glob(f"*{_ASIDE}"), *(self.folder / "chunks").glob(f"*{_ASIDE}")]:
+        for left in [*self.folder.glob(f"*{_ASIDE}"), *(self.folder / _CHUNKS).glob(f"*{_ASIDE}")]:
             left.unlink(missing_ok=True)
-        whole, damaged = set(), []
+        (self.folder / _CHUNKS).mkdir(exist_ok=True)
         for number, file in self.files().items():
-            if self.read(file) is None:
+            content = self.read(file)
+            if content is None:
                 file.unlink(missing_ok=True)
-                damaged.append(number)
-            else:
-                whole.add(number)
-        return whole, damaged
+            yield number, content
 
 
-def _packed(arrays: dict[str, np.ndarray]) -> bytes:
+@contextlib.contextmanager
+def claim(folder: Path) -> Iterator[None]:
+    """Hold a folder for this process, and make it if it is not there.
+
+    Raises:
+        InputError: a file is in the place of the folder, or the folder holds anything but a study, or another process
+            computes it.
+        OSError: it cannot be made.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder} is a file. Give a new or an empty folder as store.")
+    folder.mkdir(parents=True, exist_ok=True)
+    _require_own(folder)
+    with open(folder / _LOCK, "ab") as lock:
+        tries = 1
+        while _held_elsewhere(lock):
+            if tries == _TRIES:
+                raise InputError(
+                    f"The study in {folder} is being computed by another process. Wait for it, or give another folder "
+                    "as store; twin.study.read_study reads what is there."
+                )
+            tries += 1
+            time.sleep(_PAUSE)
+        yield
+
+
+def _require_own(folder: Path) -> None:
+    # A study that was killed while it began leaves all but the manifest.
+    own = (_MANIFEST, _SAMPLES, _CHUNKS, _LOCK)
+    others = sorted(f.name for f in folder.iterdir() if f.name not in own and f.suffix != _ASIDE)
+    if others and not Store.is_in(folder):
+        raise InputError(f"{folder} holds {others[0]!r}, but no study. Give a new or an empty folder as store.")
+
+
+def _held_elsewhere(lock: IO[bytes]) -> bool:
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        return False
+    try:
+        # A lock of the process, not of the file: children that outlive a killed process do not keep it.
+        fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return error.errno in (errno.EACCES, errno.EAGAIN)  # anything else: a file system without locks
+    return False
+
+
+def _checksum(manifest: dict[str, Any]) -> str:
+    return _digest(json.dumps(manifest, sort_keys=True).encode())
+
+
+def _packed(arrays: Mapping[str, np.ndarray], **about: Any) -> bytes:
+    """Arrays of any name, numbered in the archive, and facts about them."""
+    text = np.frombuffer(json.dumps({**about, "names": list(arrays)}).encode(), dtype=np.uint8)
     buffer = io.BytesIO()
-    np.savez(buffer, **arrays)  # pyright: ignore[reportArgumentType]
+    numbered = {str(number): array for number, array in enumerate(arrays.values())}
+    np.savez(buffer, about=text, **numbered)  # pyright: ignore[reportArgumentType]
     return buffer.getvalue()
 
 
-def _unpacked(data: bytes) -> dict[str, np.ndarray]:
+def _unpacked(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        return {name: arrays[name] for name in arrays.files}
+        about = json.loads(arrays["about"].tobytes())
+        return {name: arrays[str(number)] for number, name in enumerate(about["names"])}, about
 
 
 def _digest(data: bytes) -> str:
@@ -204,5 +270,6 @@ def _write(file: Path, data: bytes) -> None:
             os.fsync(out.fileno())
         os.replace(aside, file)
     except OSError:
-        aside.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            aside.unlink(missing_ok=True)
         raise

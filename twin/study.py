@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from twin._checks import InputError
 from twin.batch_result import DONE, STATUS, WAITING, BatchResult, blank
 from twin.store import Store, StoredChunk
 
@@ -95,9 +96,29 @@ class Gathered:
         self.outputs: dict[str, np.ndarray] = {}
         self.chunks = self.damaged = 0
         self._only = only
+        self._shapes: dict[str, tuple[int, ...]] = {}
+
+    def require_alike(self, content: StoredChunk) -> None:
+        """Raise unless a chunk has the outputs of those before.
+
+        Raises:
+            InputError: other names or shapes.
+        """
+        shapes = {name: values.shape[1:] for name, values in content.values.items()}
+        self._shapes = self._shapes or shapes
+        if shapes and shapes != self._shapes:
+            raise InputError(
+                f"The function returns {self._shapes} for some samples and {shapes} for others (names and shapes). "
+                "Return the same for each."
+            )
 
     def add(self, content: StoredChunk) -> None:
-        """Put the samples of a chunk in their places."""
+        """Put the samples of a chunk in their places.
+
+        Raises:
+            InputError: outputs of other names or shapes than those of chunks before.
+        """
+        self.require_alike(content)
         numbers = content.numbers
         self.chunks += 1
         self.status[numbers] = content.status
@@ -110,6 +131,9 @@ class Gathered:
             if self._only is None or name in self._only:
                 if name not in self.outputs:
                     self.outputs[name] = blank(len(self.status), values)
+                # One sample may give 1 where another gives 1.5.
+                kind = np.result_type(self.outputs[name], values)
+                self.outputs[name] = self.outputs[name].astype(kind, copy=False)
                 self.outputs[name][numbers] = values
 
 

@@ -2,10 +2,12 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from fitting.cli import main
 from fitting.result import FitResult
+from twin.batch import StudyInterrupted, batched
 from twin.io.parameter_file import read_parameters
 
 
@@ -44,6 +46,39 @@ def test_unknown_command_ends_with_usage():
     with pytest.raises(SystemExit) as stop:
         main(["reproduce", "nothing"])
     assert stop.value.code == 2
+
+
+def test_status_of_a_study(tmp_path, capsys):
+    batched(np.sum, np.ones((30, 2)), mode="loop", chunk_size=10, store=tmp_path / "study", progress=False)
+    assert main(["study", "status", str(tmp_path / "study")]) == 0
+    printed = capsys.readouterr().out
+    assert "30 of 30 samples (3 of 3 chunks)" in printed
+    assert "Complete." in printed
+    next(tmp_path.glob("study/chunks/*")).unlink()
+    assert main(["study", "status", str(tmp_path / "study")]) == 0
+    assert "The same call with the same store goes on." in capsys.readouterr().out
+
+
+def test_status_of_what_is_no_study(tmp_path, capsys):
+    assert main(["study", "status", str(tmp_path / "nowhere")]) == 2
+    assert "holds no study" in capsys.readouterr().err
+    assert not (tmp_path / "nowhere").exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "told"),
+    [
+        (StudyInterrupted("The executor died. 3 chunks are kept"), 3, "drivetwin: The executor died. 3 chunks"),
+        (KeyboardInterrupt(), 130, "drivetwin: stopped by Ctrl-C; what a study had stored is kept"),
+    ],
+)
+def test_interruptions_are_one_sentence(tmp_path, capsys, monkeypatch, error, code, told):
+    def interrupted(folder):
+        raise error
+
+    monkeypatch.setattr("fitting.demo.run_demo", interrupted)
+    assert main(["demo", "--out", str(tmp_path)]) == code
+    assert capsys.readouterr().err.startswith(told)
 
 
 def test_damaged_result_is_named(tmp_path):

@@ -1,0 +1,181 @@
+"""A walk through all that a function consists of, with a digest for each part that can be named in a message."""
+
+import functools
+import hashlib
+import sys
+import types
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+OWN_PACKAGES = ("twin", "sensitivity", "fitting")
+_INSTALLED = ("site-packages", "dist-packages")
+_PLAIN = bool | int | float | complex | str | bytes | types.NoneType
+
+
+class Walk:
+    """Digests by the words that say what they are of.
+
+    Code counts as it was compiled, so that comments do not, nor edits of a file that is not loaded again.
+    """
+
+    def __init__(self) -> None:
+        self._sums: dict[str, Any] = {}
+        self._visited: set[Any] = set()
+        self._open: list[int] = []
+        self._kept: list[Any] = []  # what is known by its address must live
+
+    def digests(self) -> dict[str, str]:
+        """Digests of what was added."""
+        return {where: sha.hexdigest()[:16] for where, sha in self._sums.items()}
+
+    def add(self, where: str, value: Any) -> None:
+        """Add a value and all that belongs to it.
+
+        Args:
+            where: words for what it is.
+            value: anything.
+        """
+        if isinstance(value, np.ndarray | np.generic | jax.Array):
+            array = np.asarray(value)
+            self._tell(where, "array", array.dtype.str, str(array.shape))
+            self._sums[where].update(np.ascontiguousarray(array).tobytes())
+        elif isinstance(value, _PLAIN):
+            self._tell(where, type(value).__name__, repr(value))
+        elif isinstance(value, types.ModuleType):
+            self._tell(where, "module", value.__name__)
+        elif isinstance(value, type):
+            self._tell(where, "class", f"{value.__module__}.{value.__qualname__}")
+            self._class(value)
+        elif isinstance(value, types.FunctionType) and _is_own(value.__globals__.get("__name__")):
+            self._tell(where, "function", _name(value))
+            self._function(value)
+        elif id(value) in self._open:
+            self._tell(where, "itself", str(len(self._open) - self._open.index(id(value))))
+        else:
+            self._open.append(id(value))
+            self._structure(where, value)
+            self._open.pop()
+
+    def _structure(self, where: str, value: Any) -> None:
+        if isinstance(value, functools.partial):
+            self.add(where, value.func)
+            named = {**{str(i): v for i, v in enumerate(value.args)}, **value.keywords}
+            self._items("argument ", named)
+        elif isinstance(value, list | tuple):
+            self._several(where, f"{type(value).__qualname__} {len(value)}", value)
+        elif isinstance(value, dict):
+            # The order of names is no part of the matter: JAX sorts them.
+            items = sorted(value.items(), key=lambda item: repr(item[0]))
+            self._several(where, f"dict {len(items)}", [part for item in items for part in item])
+        elif isinstance(value, set | frozenset):
+            self._several(where, "set", sorted(value, key=repr))
+        elif hasattr(value, "__dataclass_fields__"):
+            self.add(where, type(value))
+            inside = f"{where}." if where.startswith("field ") else "field "
+            self._items(inside, {name: getattr(value, name, None) for name in value.__dataclass_fields__})
+        elif isinstance(value, types.MethodType):
+            self._several(where, "method", (value.__self__, value.__func__))
+        elif hasattr(value, "__wrapped__"):
+            self._several(where, "wrapped", (value.__wrapped__,))
+        elif isinstance(value, types.FunctionType | types.BuiltinFunctionType):
+            self._tell(where, "installed", _name(value))
+        else:
+            self._object(where, value)
+
+    def _object(self, where: str, value: Any) -> None:
+        """Any other object, by what it would be copied from."""
+        self._tell(where, "object", f"{type(value).__module__}.{type(value).__qualname__}")
+        try:
+            parts = value.__reduce_ex__(2)
+        except Exception:  # a lock, a file: nothing that a result could depend on and be told again
+            return
+        self._kept.append(parts)
+        if isinstance(parts, str):
+            self._tell(where, parts)
+        else:
+            self._several(where, "parts", [list(p) if hasattr(p, "__next__") else p for p in parts])
+
+    def _several(self, where: str, kind: str, parts: Iterable[Any]) -> None:
+        self._tell(where, kind)
+        for part in parts:
+            self.add(where, part)
+
+    def _items(self, before: str, named: dict[str, Any]) -> None:
+        for name in sorted(named):
+            self.add(f"{before}{name}", named[name])
+
+    def _class(self, cls: type) -> None:
+        for owner in cls.__mro__:
+            if not _is_own(owner.__module__) or self._was_here(owner):
+                continue
+            for name, value in sorted(vars(owner).items()):
+                inner = getattr(value, "fget", getattr(value, "__func__", value))
+                if isinstance(inner, types.FunctionType) and _is_own(inner.__globals__.get("__name__")):
+                    self._function(inner)
+                elif isinstance(value, _PLAIN | np.ndarray | jax.Array) and not name.startswith("__"):
+                    self.add(f"{name} of the class {_name(owner)}", value)
+
+    def _function(self, function: types.FunctionType) -> None:
+        if self._was_here(function):
+            return
+        name, names = _name(function), _names(function.__code__)
+        self._tell(f"the code of {name}", _code(function.__code__))
+        for cell_name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+            if cell != types.CellType():  # an empty one
+                self.add(f"{cell_name}, which {name} is closed over", cell.cell_contents)
+        self.add(f"a default of {name}", [function.__defaults__, function.__kwdefaults__])
+        self._globals(str(function.__globals__.get("__name__")), function.__globals__, names)
+
+    def _globals(self, module: str, found: dict[str, Any], names: set[str]) -> None:
+        for name in sorted(names & found.keys()):
+            value = found[name]
+            if isinstance(value, types.ModuleType) and _is_own(value.__name__):
+                if not self._was_here(value, frozenset(names)):
+                    self._globals(value.__name__, vars(value), names)
+            elif not self._was_here(module, name):
+                self.add(f"{name} of {module}", value)
+
+    def _was_here(self, *what: Any) -> bool:
+        key = tuple(one if isinstance(one, str | frozenset) else id(one) for one in what)
+        was = key in self._visited
+        self._visited.add(key)
+        self._kept.append(what)
+        return was
+
+    def _tell(self, where: str, *texts: str) -> None:
+        self._sums.setdefault(where, hashlib.sha256()).update("\0".join([*texts, ""]).encode(errors="surrogatepass"))
+
+
+def _name(thing: Any) -> str:
+    return f"{thing.__module__}.{thing.__qualname__}"
+
+
+def _is_own(module: str | None) -> bool:
+    """Whether code is the user's own: neither installed, whose versions are compared, nor of drivetwin."""
+    if module is None or module == "__main__":
+        return True
+    if module.split(".")[0] in (*OWN_PACKAGES, *sys.stdlib_module_names):
+        return False
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return file is None or not set(_INSTALLED) & set(Path(file).parts)
+
+
+def _code(code: types.CodeType) -> str:
+    constants = [_constant(constant) for constant in code.co_consts]
+    names = (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
+    return f"{code.co_code.hex()} {code.co_argcount} {names} {constants}"
+
+
+def _constant(value: Any) -> str:
+    if isinstance(value, types.CodeType):
+        return _code(value)
+    return repr(sorted(value, key=repr) if isinstance(value, frozenset) else value)
+
+
+def _names(code: types.CodeType) -> set[str]:
+    inner = [constant for constant in code.co_consts if isinstance(constant, types.CodeType)]
+    return {*code.co_names, *(name for one in inner for name in _names(one))}

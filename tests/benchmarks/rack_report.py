@@ -107,7 +107,7 @@ def _limits(rows: list[Row]) -> list[str]:
     """What bounds the speed, in words and in operations per second."""
     work = work_per_evaluation(WIDTH)
     lines = [
-        f"The vector field is {work.flops:.0f} operations and {work.read_and_written:.0f} bytes of cache an evaluation, "
+        f"The vector field is {work.flops:.0f} operations and {work.read_and_written:.0f} bytes of cache each time, "
         "a step of Bosh3 three evaluations: by the compiler's `cost_analysis` of the vector field compiled alone.",
     ]
     for row in rows:

@@ -60,7 +60,7 @@ def twin_jacobian(stepping: AbstractStepping) -> Callable[[np.ndarray], np.ndarr
 
 
 class Work(NamedTuple):
-    """Work of one evaluation of the vector field for one of the variants that run in step, as the compiler counts it."""
+    """Work of one evaluation of the vector field for one of the variants, as the compiler counts it."""
 
     flops: float
     """Floating-point operations [-]; a root, an exponential or a quotient counts as one."""

@@ -1,5 +1,6 @@
-"""Error-controlled integration by diffrax, with forward sensitivities integrated together with the state."""
+"""Error-controlled integration, with forward sensitivities integrated together with the state."""
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -11,9 +12,10 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float, Int, PyTree
 
+from twin._embedded import integrate_embedded
 from twin.plant import AbstractPlant
 from twin.references import AbstractReference
-from twin.stepping import AdaptiveSteps
+from twin.stepping import AdaptiveSteps, EmbeddedSteps
 
 # How an integration ended. Only a state that is no longer finite drives the step to its smallest length.
 COMPLETE, OUT_OF_STEPS, DIVERGED = 0, 1, 2
@@ -24,19 +26,20 @@ def solve_adaptive(
     reference: AbstractReference,
     state: PyTree[Array],
     times: Float[Array, "times"],
-    stepping: AdaptiveSteps,
+    stepping: AdaptiveSteps | EmbeddedSteps,
 ) -> tuple[PyTree[Array], Int[Array, ""]]:
     """States at the times, and how the integration ended: COMPLETE, OUT_OF_STEPS or DIVERGED."""
-    if stepping.gradient == "reverse":
+    if isinstance(stepping, AdaptiveSteps) and stepping.gradient == "reverse":
         return _integrate(_field(plant, reference), state, times, reference, stepping)
 
-    # The derivative rule sees one flat tuple of arrays; everything else is closed over.
+    # The derivative rule sees one flat list of arrays; everything else is closed over.
     varied, fixed = eqx.partition((plant, reference, state), eqx.is_inexact_array)
+    varied, structure = jax.tree.flatten(varied)
     settings, options = eqx.partition((times, stepping), eqx.is_array)
 
-    def rebuild(arrays: PyTree) -> tuple[AbstractPlant, AbstractReference, PyTree]:
+    def rebuild(arrays: list) -> tuple[AbstractPlant, AbstractReference, PyTree]:
         # JAX hands constants to the rules below as NumPy literals.
-        return eqx.combine(jax.tree.map(jnp.asarray, arrays), fixed)
+        return eqx.combine(jax.tree.unflatten(structure, [jnp.asarray(a) for a in arrays]), fixed)
 
     @jax.custom_jvp
     def solve(arrays: PyTree, settings: PyTree) -> tuple[PyTree, Int[Array, ""]]:
@@ -45,39 +48,46 @@ def solve_adaptive(
         return _integrate(_field(plant, reference), state, times, reference, stepping)
 
     def with_directions(
-        arrays: PyTree, directions: PyTree, axes: PyTree, settings: PyTree
+        arrays: list, directions: dict, axes: dict, settings: PyTree
     ) -> tuple[PyTree, Int[Array, ""], PyTree]:
-        """State and its derivative along several directions at once; `axes` says which leaves differ between them."""
+        """State and its derivative along several directions at once.
+
+        Directions have entries for those arrays that change, by their number; `axes` says which differ between them.
+        """
         _, reference, state = rebuild(arrays)
+        moving = {number: jnp.asarray(arrays[number]) for number in directions}
         times, stepping = eqx.combine(settings, options)
         # A direction stands for about 100 % of its parameters, so that state and sensitivity share one tolerance.
-        size = jax.vmap(lambda d: _relative_size(arrays, d), in_axes=(axes,))(directions)
+        size = jax.vmap(lambda d: _relative_size(moving, d), in_axes=(axes,))(directions)
 
-        def flow(arrays: PyTree, t: Array, y: PyTree) -> PyTree:
-            plant, reference, _ = rebuild(arrays)
+        def moved(moving: dict) -> tuple[AbstractPlant, AbstractReference, PyTree]:
+            return rebuild([moving.get(number, array) for number, array in enumerate(arrays)])
+
+        def flow(moving: dict, t: Array, y: PyTree) -> PyTree:
+            plant, reference, _ = moved(moving)
             return plant.vector_field(t, y, reference(t))
+
+        def scaled(direction: dict, scale: Array) -> dict:
+            return jax.tree.map(lambda d: d / scale, direction)
+
+        along = jax.vmap(scaled, in_axes=(axes, 0))(directions, size)
 
         def augmented(t: Array, y: Any) -> Any:
             value, sensitivity = y
-            rate, derivative = jax.linearize(lambda a, v: flow(a, t, v), arrays, value)
+            rate, derivative = jax.linearize(lambda a, v: flow(a, t, v), moving, value)
+            return rate, jax.vmap(derivative)(along, sensitivity)
 
-            def along(direction: PyTree, scale: Array, s: PyTree) -> PyTree:
-                return derivative(jax.tree.map(lambda d: d / scale, direction), s)
+        def at_start(direction: dict) -> PyTree:
+            return jax.jvp(lambda a: moved(a)[2], (moving,), (direction,))[1]
 
-            return rate, jax.vmap(along, in_axes=(axes, 0, 0))(directions, size, sensitivity)
-
-        def at_start(direction: PyTree, scale: Array) -> PyTree:
-            _, d_state = jax.jvp(lambda a: rebuild(a)[2], (arrays,), (direction,))
-            return jax.tree.map(lambda d: d / scale, d_state)
-
-        sensitivity = jax.vmap(at_start, in_axes=(axes, 0))(directions, size)
+        sensitivity = jax.vmap(at_start)(along)
         (states, sensitivities), ending = _integrate(augmented, (state, sensitivity), times, reference, stepping)
         # Saved times lead; directions go first, as vmap wants them.
         unscaled = jax.tree.map(lambda s: jnp.moveaxis(s, 1, 0) * _fit(size, s.ndim), sensitivities)
         return states, ending, unscaled
 
     @jax.custom_batching.custom_vmap
-    def along_one(arrays: PyTree, direction: PyTree, settings: PyTree) -> tuple[PyTree, Int[Array, ""], PyTree]:
+    def along_one(arrays: list, direction: dict, settings: PyTree) -> tuple[PyTree, Int[Array, ""], PyTree]:
         directions = jax.tree.map(lambda d: d[None], direction)
         states, ending, tangents = with_directions(arrays, directions, jax.tree.map(lambda _: 0, directions), settings)
         return states, ending, jax.tree.map(lambda s: s[0], tangents)
@@ -95,10 +105,13 @@ def solve_adaptive(
         flags = (jax.tree.map(lambda _: False, states), False, jax.tree.map(lambda _: True, tangents))
         return out, flags
 
-    @solve.defjvp
+    # Arrays that do not change take no part in the sensitivities: most parameters of a model are fixed.
+    @functools.partial(solve.defjvp, symbolic_zeros=True)
     def solve_jvp(primals: Any, tangents: Any) -> Any:
         arrays, settings = primals
-        states, ending, derivative = along_one(arrays, tangents[0], settings)
+        changes = enumerate(tangents[0])
+        direction = {number: d for number, d in changes if not isinstance(d, jax.custom_derivatives.SymbolicZero)}
+        states, ending, derivative = along_one(arrays, direction, settings)
         return (states, ending), (derivative, _no_tangent(ending))
 
     return solve(varied, settings)
@@ -109,25 +122,45 @@ def _field(plant: AbstractPlant, reference: AbstractReference) -> Callable:
 
 
 def _integrate(
-    field: Callable, state: PyTree[Array], times: Array, reference: AbstractReference, stepping: AdaptiveSteps
+    field: Callable,
+    state: PyTree[Array],
+    times: Array,
+    reference: AbstractReference,
+    stepping: AdaptiveSteps | EmbeddedSteps,
 ) -> tuple[PyTree[Array], Int[Array, ""]]:
-    controller = diffrax.PIDController(
-        rtol=stepping.rtol, atol=stepping.atol, norm=optx.max_norm, dtmin=stepping.min_step, force_dtmin=False
-    )
     # What a reference returns is continuous, so a moving switching time adds nothing of its own to a derivative.
     knots = jax.lax.stop_gradient(reference.switching_times())
-    if knots.shape[0] > 0:
-        controller = diffrax.ClipStepSizeController(controller, jump_ts=knots)
-    reverse = stepping.gradient == "reverse"
     # The integrator sees the leaves alone: empty tuples in a state (a law without memory) trip its buffers.
     leaves, structure = jax.tree.flatten(state)
 
-    def rates(t: Any, y: Any, args: Any) -> Any:
-        del args
+    def rates(t: Array, y: list[Array]) -> list[Array]:
         return jax.tree.leaves(field(t, jax.tree.unflatten(structure, y)))
 
+    if isinstance(stepping, AdaptiveSteps):
+        rows, ending = _by_diffrax(rates, leaves, times, knots, stepping)
+    else:
+        rows, ending = _by_embedded_pair(rates, leaves, times, knots, stepping)
+    return jax.tree.unflatten(structure, rows), ending
+
+
+def _by_embedded_pair(
+    rates: Callable, leaves: list[Array], times: Array, knots: Array, stepping: EmbeddedSteps
+) -> tuple[list[Array], Int[Array, ""]]:
+    rows, complete, stuck, _ = integrate_embedded(rates, leaves, times, knots, stepping)
+    return rows, jnp.where(complete, COMPLETE, jnp.where(stuck, DIVERGED, OUT_OF_STEPS))
+
+
+def _by_diffrax(
+    rates: Callable, leaves: list[Array], times: Array, knots: Array, stepping: AdaptiveSteps
+) -> tuple[list[Array], Int[Array, ""]]:
+    controller = diffrax.PIDController(
+        rtol=stepping.rtol, atol=stepping.atol, norm=optx.max_norm, dtmin=stepping.min_step, force_dtmin=False
+    )
+    if knots.shape[0] > 0:
+        controller = diffrax.ClipStepSizeController(controller, jump_ts=knots)
+    reverse = stepping.gradient == "reverse"
     solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(rates),
+        diffrax.ODETerm(lambda t, y, args: rates(t, y)),
         stepping.solver,
         t0=times[0],
         t1=times[-1],
@@ -141,7 +174,7 @@ def _integrate(
     )
     failed = jnp.where(solution.result == diffrax.RESULTS.dt_min_reached, DIVERGED, OUT_OF_STEPS)
     ending = jnp.where(solution.result == diffrax.RESULTS.successful, COMPLETE, failed)
-    return jax.tree.unflatten(structure, jax.tree.leaves(solution.ys)), ending
+    return jax.tree.leaves(solution.ys), ending
 
 
 def _relative_size(arrays: PyTree, direction: PyTree) -> Float[Array, ""]:

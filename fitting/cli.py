@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from twin._checks import InputError
+from twin._input_error import InputError
 from twin._loop_option import make_small_loops_one_function
 
 
@@ -26,7 +26,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Packages never change JAX's configuration; the program that uses them does.
     import jax
 
+    from twin.compile_cache import use_compile_cache
+
     jax.config.update("jax_enable_x64", True)
+    use_compile_cache()
     from twin.batch import StudyInterrupted
 
     try:

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 # Points per interval among which the smallest cost of the interpolated measures is looked for.
 _POINTS = 64
@@ -99,6 +98,8 @@ def _promised(
     x: np.ndarray, y: np.ndarray, slope: np.ndarray, known: np.ndarray, cost: Callable[[np.ndarray], np.ndarray]
 ) -> tuple[float, float]:
     """Smallest cost of the interpolated measures between neighbours that are both known, and where."""
+    from scipy.interpolate import CubicHermiteSpline  # a second to import
+
     least, place = np.inf, float(x[known][0])
     for i in np.flatnonzero(known[:-1] & known[1:]):
         curve = CubicHermiteSpline(x[i : i + 2], y[:, i : i + 2], slope[:, i : i + 2], axis=1)

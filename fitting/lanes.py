@@ -5,7 +5,6 @@ its own. Here the program has one width. A lane whose fit has ended takes the ne
 its own set of lanes. What a fit does depends on nothing in the other lanes, to the last bit.
 """
 
-import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -22,6 +21,7 @@ from fitting.objective import Objective, cost_of, equality_of, inequality_of, re
 from fitting.solve import Solved, Solver, options_of, outcome
 from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt, BoundedState
 from fitting.solvers.stop import CONVERGED, STOPS, Stop
+from twin._cores import usable_cores
 from twin._lapack import calls_lapack
 from twin._recursion import tangents_alongside
 
@@ -102,7 +102,7 @@ def solve_lanes(
     """
     count, size = task.start.shape
     if threads is None:
-        threads = (os.cpu_count() or 1) if jax.default_backend() == "cpu" else 1
+        threads = len(usable_cores()) if jax.default_backend() == "cpu" else 1
         if (
             threads > 1
             and count > width

@@ -5,7 +5,6 @@ improved R̂ for assessing convergence of MCMC", Bayesian Analysis 16 (2021) 667
 """
 
 import numpy as np
-from scipy import stats
 
 
 def r_hat(samples: np.ndarray) -> np.ndarray:
@@ -42,6 +41,8 @@ def _halves(samples: np.ndarray) -> np.ndarray:
 
 def _normal_scores(samples: np.ndarray) -> np.ndarray:
     """Normal quantiles of the ranks over all chains, eq. 14."""
+    from scipy import stats  # two seconds to import
+
     flat = samples.reshape(-1, samples.shape[2])
     ranks = stats.rankdata(flat, axis=0)
     scores = stats.norm.ppf((ranks - 0.375) / (len(flat) + 0.25))

@@ -3,15 +3,17 @@
 import dataclasses
 from collections import Counter
 from collections.abc import Sequence
+from concurrent.futures import Executor
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
-from scipy import stats
 
 from fitting.constraints import AbstractConstraint, all_constraints, check_constraints
 from fitting.fit import check_residual, chosen_solver, result_of
-from fitting.lanes import WIDTH, Ended, Task, solve_lanes
+from fitting.fits_from_starts import FitsFromStarts
+from fitting.lanes import WIDTH, Ended
 from fitting.objective import Objective
 from fitting.residuals.residual import AbstractResidual
 from fitting.result import FitResult
@@ -143,6 +145,9 @@ def multistart(
     variance: str = "estimated",
     width: int = WIDTH,
     threads: int | None = None,
+    store: str | Path | None = None,
+    executor: Executor | None = None,
+    progress: bool = True,
 ) -> MultistartResult:
     """Fit from many starts as one batch. A start that fails is marked and counted, never fatal.
 
@@ -167,6 +172,9 @@ def multistart(
         width: fits that run in step.
         threads: sets of lanes that run side by side. By default the number of cores, and one where the residual calls
             LAPACK: two programs that do can wait for each other for ever.
+        store: folder that keeps the ends, 128 starts at a time, so that a long run that was killed goes on.
+        executor: where the fits run, see `twin.batch.batched`; None for this process.
+        progress: show a bar.
 
     Returns:
         All ends, the minima, and the results kept.
@@ -194,24 +202,27 @@ def multistart(
         """Cost up to which a fit is kept."""
         if keep != "consistent":
             return np.inf if keep == "all" else best
-        reach = float(stats.chi2.ppf(0.95, len(space)))
+        from scipy import special
+
+        reach = float(special.chdtri(len(space), 0.05))
         return best + 0.5 * reach if variance == "known" else best * (1 + reach / max(rows - len(space), 1))
 
-    bounds = [np.tile(np.asarray(side), (len(vectors), 1)) for side in (space.lower, space.upper)]
-    ended = solve_lanes(
+    fits = FitsFromStarts(
         Objective(residual, model, space, constraints),
-        Task(np.where(outside[:, None], np.nan, vectors), *bounds),
         solver,
-        max_steps=max_steps,
+        max_steps,
+        width,
+        threads,
         keep=lambda cost, best: cost <= limit(best),
-        width=width,
-        threads=threads,
     )
+    possible = np.where(outside[:, None], np.nan, vectors)
+    ended = fits.run(possible, store=store, executor=executor, progress=progress)
     # Without a converged fit the lowest of the others is the best there is to look at.
     counted = ended.success if ended.success.any() else np.isfinite(ended.cost)
     highest = limit(float(np.min(ended.cost, where=counted, initial=np.inf)))
-    chosen = [i for i in sorted(ended.kept) if keep == "all" or (counted[i] and ended.cost[i] <= highest)]
-    results = {i: result_of(ended.kept[i], model, space, correlated=correlated, variance=variance) for i in chosen}
+    chosen = [i for i in np.flatnonzero(np.isfinite(ended.cost)).tolist() if keep == "all" or counted[i]]
+    solved = fits.outcomes(possible, [i for i in chosen if ended.cost[i] <= highest])
+    results = {i: result_of(one, model, space, correlated=correlated, variance=variance) for i, one in solved.items()}
     return MultistartResult(
         space=space,
         starts=space.unscaled_rows(vectors),

@@ -8,7 +8,6 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
-from scipy import stats
 
 from fitting.constraints import AbstractConstraint, all_constraints
 from fitting.fit import chosen_solver
@@ -207,8 +206,10 @@ def _values(objective: Objective, vector: Array) -> tuple[Array, Array | None]:
 
 
 def _critical(level: float, freedom: int | None) -> float:
+    from scipy import special
+
     tail = 0.5 + level / 2
-    return float(stats.norm.ppf(tail) if freedom is None else stats.t.ppf(tail, freedom))
+    return float(special.ndtri(tail) if freedom is None else special.stdtrit(freedom, tail))
 
 
 def _profile(search: ProfileSearch, path: str, index: int) -> Profile:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from scipy import stats
 
 from fitting.solvers.stop import CONVERGED, Stop
 from twin._checks import InputError
@@ -161,7 +160,9 @@ class FitResult:
         freedom = np.inf if self.variance == "known" else self.degrees_of_freedom
         if freedom < 1:
             return np.full((len(self.space), 2), np.nan)
-        reach = stats.t.ppf(0.5 + level / 2, freedom) * np.sqrt(np.diag(self.scaled_covariance))
+        from scipy import special  # half a second to import, the quantiles of scipy.stats two
+
+        reach = special.stdtrit(freedom, 0.5 + level / 2) * np.sqrt(np.diag(self.scaled_covariance))
         ends = [np.asarray(self.space.unscaled(jnp.asarray(self.scaled + side * reach))) for side in (-1, 1)]
         return np.stack(ends, axis=1)
 

@@ -1,11 +1,12 @@
 """Small problems of NumPy's linear algebra, shared out whole among threads."""
 
-import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
+
+from twin._cores import usable_cores
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -23,5 +24,5 @@ def shared_out(function: Callable[[Task], Result], tasks: Iterable[Task], thread
         tasks: its arguments.
         threads: tasks done side by side; the number of cores if not given.
     """
-    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(threads or len(usable_cores())) as pool:
         return list(pool.map(function, tasks))

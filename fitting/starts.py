@@ -1,7 +1,6 @@
 """Where many fits start: points that fill the box of a parameter space."""
 
 import numpy as np
-from scipy.stats import qmc
 
 from twin._checks import InputError
 from twin.parameters import ParameterSpace
@@ -36,6 +35,8 @@ def sample_starts(space: ParameterSpace, count: int, *, sampler: str = "sobol", 
                 f"{parameter.path}: starts are drawn between the bounds, but these are [{parameter.lower:g}, "
                 f"{parameter.upper:g}] {parameter.unit}. Give finite bounds{positive}, or give the starts as an array."
             )
+    from scipy.stats import qmc  # two seconds to import
+
     size = len(space)
     if sampler == "sobol":
         # Drawn to the next power of two, as the sequence is balanced only there.

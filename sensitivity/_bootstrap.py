@@ -1,7 +1,6 @@
 """The bootstrap as a matrix product: each resample is a row of weights over the points drawn from."""
 
 import numpy as np
-from scipy import special
 
 from twin._checks import InputError
 
@@ -36,6 +35,8 @@ def with_interval(drawn: np.ndarray, confidence: float) -> tuple[np.ndarray, np.
         drawn: the estimate first, then those of the resamples.
         confidence: probability of the interval.
     """
+    from scipy import special  # half a second to import
+
     return drawn[0].T, special.ndtri(0.5 + confidence / 2) * drawn[1:].std(axis=0, ddof=1).T
 
 

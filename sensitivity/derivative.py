@@ -1,6 +1,8 @@
 """Derivative-based measures: mean squared derivatives, exact by automatic differentiation, and what they bound."""
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -42,6 +44,9 @@ def derivative_measures(
     chunk: int = 64,
     confidence: float = 0.95,
     resamples: int = 100,
+    store: str | Path | None = None,
+    executor: Executor | None = None,
+    progress: bool = True,
 ) -> DerivativeMeasures:
     """Mean squared derivatives of every output, and the bounds on total effects that follow.
 
@@ -63,6 +68,9 @@ def derivative_measures(
         chunk: points differentiated at once.
         confidence: probability that the intervals are made for.
         resamples: bootstrap samples that the intervals come from.
+        store: folder that keeps what was evaluated, so that a study that was killed goes on.
+        executor: where it is evaluated, see `twin.batch.batched`; None for this process.
+        progress: show a bar.
 
     Returns:
         Measures and bounds.
@@ -77,13 +85,23 @@ def derivative_measures(
         raise InputError(f'mode must be "auto", "forward" or "reverse", but is {mode!r}.')
     require_interval(confidence, resamples)
     values = derivative_samples(space, n, seed=seed)
-    found = evaluate(_WithSlopes(fn, space, model is not None, mode), space, values, model=model, chunk=chunk)
-    done = {name: array for (kind, name), array in found.items() if kind == "value"}
-    slopes = [array.reshape(n, -1, len(space)) for (kind, _), array in found.items() if kind == "slope"]
+    found = evaluate(
+        _WithSlopes(fn, space, model is not None, mode),
+        space,
+        values,
+        model=model,
+        chunk=chunk,
+        seed=seed,
+        store=store,
+        executor=executor,
+        progress=progress,
+    )
+    done = {name[len(_VALUE) :]: array for name, array in found.items() if name.startswith(_VALUE)}
+    slopes = [array.reshape(n, -1, len(space)) for name, array in found.items() if name.startswith(_SLOPE)]
     return measures_from_derivatives(
         space,
         values,
-        done.get(None, done),
+        done.get("", done),
         np.concatenate(slopes, axis=1),
         seed=seed,
         outputs=outputs,
@@ -191,6 +209,9 @@ def screen(measures: DerivativeMeasures, threshold: float = 0.01) -> Screening:
     return Screening(tuple(paths[kept].tolist()), tuple(paths[~kept].tolist()), by_path)
 
 
+_VALUE, _SLOPE = "value ", "slope "
+
+
 class _WithSlopes(eqx.Module):
     """A function's outputs together with their derivatives; compiled once for a function, space and mode."""
 
@@ -203,23 +224,23 @@ class _WithSlopes(eqx.Module):
     mode: str = eqx.field(static=True)
     """"auto", "forward" or "reverse"."""
 
-    def __call__(self, target: Any) -> dict[tuple[str, Any], Float[Array, "..."]]:
-        """Outputs ("value", name), and their derivatives ("slope", name) by the values in SI, whose axis comes last.
+    def __call__(self, target: Any) -> dict[str, Float[Array, "..."]]:
+        """Outputs "value NAME", and their derivatives "slope NAME" by the values in SI, whose axis comes last.
 
         Args:
             target: values in SI (parameters,), or a model that has them.
         """
         values = self.space.values(target) if self.takes_model else target
-        names: list[Any] = [None]
+        names: list[str] = [""]
 
         def twice(x: Float[Array, "parameters"]) -> tuple[list[Any], list[Any]]:
             done = self.fn(self.space.with_values(target, x) if self.takes_model else x)
-            names[:] = list(done) if isinstance(done, Mapping) else [None]
+            names[:] = map(str, done) if isinstance(done, Mapping) else [""]
             done = list(done.values()) if isinstance(done, Mapping) else [done]
             return done, done
 
         count = sum(leaf.size for leaf in jax.tree.leaves(eqx.filter_eval_shape(twice, values)[0]))
         forward = self.mode == "forward" or (self.mode == "auto" and count >= len(self.space))
         slopes, found = (jax.jacfwd if forward else jax.jacrev)(twice, has_aux=True)(values)
-        by_name = {("value", name): value for name, value in zip(names, found, strict=True)}
-        return by_name | {("slope", name): slope for name, slope in zip(names, slopes, strict=True)}
+        by_name = {_VALUE + name: value for name, value in zip(names, found, strict=True)}
+        return by_name | {_SLOPE + name: slope for name, slope in zip(names, slopes, strict=True)}

@@ -1,16 +1,20 @@
 """A function's outputs at many samples: batched, named, and refused when one of them is not finite."""
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
 from typing import Any
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from twin._checks import InputError, require_x64
+from twin.batch import batched
 from twin.parameters import ParameterSpace
+
+_BARE = "f(x)"
+"""Name of the output of a function that names none."""
 
 
 def evaluate(
@@ -19,9 +23,13 @@ def evaluate(
     values: Float[ArrayLike, "rows parameters"],
     *,
     model: Any = None,
-    chunk: int = 256,
+    chunk: int | str = 256,
+    seed: int | None = None,
+    store: str | Path | None = None,
+    executor: Executor | None = None,
+    progress: bool = True,
 ) -> Any:
-    """Outputs of a function at many samples, compiled once and mapped over chunks of one shape.
+    """Outputs of a function at many samples, by `twin.batch.batched`.
 
     Args:
         fn: JAX function of the values in SI (parameters,), or of the model if one is given. It returns a number, a
@@ -30,12 +38,17 @@ def evaluate(
         values: samples (rows, parameters), SI.
         model: model whose parameters take the values; None where `fn` takes the vector.
         chunk: samples evaluated at once. More are not faster once the processor is busy, and take memory.
+        seed: what the samples were drawn with, for the store.
+        store: folder that keeps what was evaluated, so that a study that was killed goes on.
+        executor: where it is evaluated, see `twin.batch.batched`; None for this process.
+        progress: show a bar.
 
     Returns:
         What `fn` returns, with the samples as first axis of every array.
 
     Raises:
-        InputError: not one column per parameter, a chunk that is no positive number.
+        InputError: not one column per parameter, a chunk that is no positive number, a sample at which `fn` raises, a
+            store that holds another study.
     """
     require_x64()
     rows = np.asarray(values, dtype=float)
@@ -44,37 +57,44 @@ def evaluate(
             f"values has the shape {rows.shape}, but one row per sample and one column for each of the {len(space)} "
             "parameters were expected."
         )
-    if chunk < 1:
+    if isinstance(chunk, int) and chunk < 1:
         raise InputError(f"chunk must be at least 1, but is {chunk}.")
-    chunk = min(chunk, rows.shape[0])
-    parts = []
-    keys: tuple[Any, ...] = ()
-    for start in range(0, rows.shape[0], chunk):
-        part = rows[start : start + chunk]
-        # The last chunk is filled up with its own first row: another shape would be compiled once more.
-        full = np.concatenate([part, np.repeat(part[:1], chunk - len(part), axis=0)])
-        done, keys = _mapped(fn, space, model, jnp.asarray(full))
-        parts.append(jax.tree.map(np.asarray, done))
-    found = jax.tree.map(lambda *x: np.concatenate(x)[: rows.shape[0]], *parts)
-    return dict(zip(keys, found, strict=True)) if keys else found
+    found = batched(
+        _AtValues(fn, space, model),
+        rows,
+        chunk_size=chunk,
+        seed=seed,
+        store=store,
+        executor=executor,
+        progress=progress,
+    )
+    if found.messages:
+        raise InputError(f"The function failed at some samples. {found.message}")
+    outputs = dict(found.outputs)
+    return outputs[_BARE] if list(outputs) == [_BARE] else outputs
 
 
-@eqx.filter_jit
-def _mapped(
-    fn: Callable[..., Any], space: ParameterSpace, model: Any, rows: Float[Array, "rows n"]
-) -> tuple[Any, tuple[Any, ...]]:
-    keys: tuple[Any, ...] = ()
+class _AtValues(eqx.Module):
+    """A function of the values, by way of the model if there is one."""
 
-    def one(row: Float[Array, "n"]) -> Any:
-        nonlocal keys
-        done = fn(row if model is None else space.with_values(model, row))
-        if not isinstance(done, Mapping):
-            return done
-        # JAX sorts the keys of a dict, but names were given in the order of the caller.
-        keys = tuple(done)
-        return list(done.values())
+    fn: Callable[..., Any]
+    """The function."""
+    space: ParameterSpace
+    """The parameters."""
+    model: Any
+    """The model, or None."""
 
-    return jax.vmap(one)(rows), keys
+    def __call__(self, row: Float[Array, "n"]) -> Any:
+        """Outputs by name.
+
+        Args:
+            row: values in SI.
+        """
+        done = self.fn(row if self.model is None else self.space.with_values(self.model, row))
+        found = dict(done) if isinstance(done, Mapping) else {_BARE: done}
+        if not all(eqx.is_array_like(value) for value in found.values()):
+            raise InputError(f"The function returned {done!r}. Return a number, a vector, or a dict of such.")
+        return found
 
 
 def named_columns(values: Any, outputs: Sequence[str] | None, rows: int) -> tuple[np.ndarray, tuple[str, ...]]:

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -122,6 +123,9 @@ def morris(
     chunk: int = 256,
     confidence: float = 0.95,
     resamples: int = 100,
+    store: str | Path | None = None,
+    executor: Executor | None = None,
+    progress: bool = True,
 ) -> ElementaryEffects:
     """Elementary effects on every output of a function, at SALib's trajectories.
 
@@ -136,6 +140,9 @@ def morris(
         chunk: samples evaluated at once.
         confidence: probability that the intervals are made for.
         resamples: bootstrap samples, of whole trajectories, that the intervals come from.
+        store: folder that keeps what was evaluated, so that a study that was killed goes on.
+        executor: where it is evaluated, see `twin.batch.batched`; None for this process.
+        progress: show a bar.
 
     Returns:
         Means and standard deviations of the effects.
@@ -159,7 +166,18 @@ def morris(
     problem = {"num_vars": len(space), "names": list(space.paths), "bounds": [[0.0, 1.0]] * len(space)}
     unit = salib.sample(problem, trajectories, num_levels=levels, seed=seed)
     values = from_unit(space, unit)
-    matrix, names = named_columns(evaluate(fn, space, values, model=model, chunk=chunk), outputs, len(values))
+    found = evaluate(
+        fn,
+        space,
+        values,
+        model=model,
+        chunk=chunk,
+        seed=seed,
+        store=store,
+        executor=executor,
+        progress=progress,
+    )
+    matrix, names = named_columns(found, outputs, len(values))
     require_finite(matrix, names, space, values)
     effects = _effects(unit.reshape(trajectories, -1, len(space)), matrix.reshape(trajectories, -1, len(names)))
     weights = bootstrap_weights(trajectories, resamples, seed)

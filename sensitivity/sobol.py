@@ -1,6 +1,8 @@
 """Sobol indices: which parameters cause the variance of which outputs. One sample matrix serves all outputs."""
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,6 +31,9 @@ def sobol(
     chunk: int = 256,
     confidence: float = 0.95,
     resamples: int = 100,
+    store: str | Path | None = None,
+    executor: Executor | None = None,
+    progress: bool = True,
 ) -> SobolIndices:
     """Sobol indices of every output of a function.
 
@@ -45,6 +50,9 @@ def sobol(
         chunk: samples evaluated at once.
         confidence: probability that the intervals are made for.
         resamples: bootstrap samples that the intervals come from.
+        store: folder that keeps what was evaluated, so that a study that was killed goes on.
+        executor: where it is evaluated, see `twin.batch.batched`; None for this process.
+        progress: show a bar.
 
     Returns:
         The indices with their intervals, and how they converged with n.
@@ -53,7 +61,17 @@ def sobol(
         InputError: bounds missing, n not a power of two, an output that is not finite at some sample, and so on.
     """
     samples = sobol_samples(space, n, seed=seed, second_order=second_order, groups=groups)
-    values = evaluate(fn, space, samples.values, model=model, chunk=chunk)
+    values = evaluate(
+        fn,
+        space,
+        samples.values,
+        model=model,
+        chunk=chunk,
+        seed=seed,
+        store=store,
+        executor=executor,
+        progress=progress,
+    )
     return sobol_indices(samples, values, outputs=outputs, confidence=confidence, resamples=resamples)
 
 

@@ -18,6 +18,15 @@ CORE_FILES = ("simulation.py", "linear.py", "frf.py", "frf_estimators.py", "resp
 CORE_FILES += ("plant.py", "stepping.py", "trajectory.py")
 NOT_IN_CORE = {"matplotlib", "pandas", "SALib", "pooch", "tomlkit", "pint", "json", "pathlib", "os"}
 
+# What a notebook imports first, and the libraries that are loaded by what uses them, not by these.
+LIGHT = ("twin", "twin.simulation", "twin.drives", "twin.control", "twin.linear", "twin.parameters", "twin.references")
+LIGHT += ("twin.laws", "twin.modal", "twin.sweep", "twin.frf", "twin.frf_estimators", "twin.correlation")
+LIGHT += ("twin.structure", "twin.performance", "twin.record", "twin.plots", "twin.compile_cache", "twin.io.csv")
+LIGHT += ("sensitivity", "sensitivity.plots", "fitting.fit", "fitting.multistart", "fitting.profile", "fitting.plots")
+LIGHT += ("fitting.identifiability", "fitting.design", "fitting.posterior", "fitting.identification.output_error")
+LATE = {"matplotlib", "pandas", "SALib", "scipy", "interpax", "pint", "pooch", "platformdirs", "tomlkit", "pyuff"}
+LATE |= {"h5py", "blackjax", "requests"}
+
 
 def modules(path):
     """Top-level packages, and whole names, that a file imports."""
@@ -90,22 +99,36 @@ def test_every_public_thing_is_documented():
             assert cls.__doc__, cls
 
 
+def run_python(code):
+    return subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+
+
 def test_importing_changes_and_loads_nothing():
-    """No import switches x64 on, and plots, tables and SALib are not loaded before they are needed."""
+    """No import changes JAX's configuration or the environment, or loads what is not needed yet."""
     code = (
-        "import sys, jax; before = jax.config.jax_enable_x64\n"
-        "import twin.simulation, twin.drives, twin.control, twin.linear\n"
-        "import fitting.fit, fitting.identification.output_error\n"
-        "import sensitivity, sensitivity.plots\n"
-        "assert jax.config.jax_enable_x64 == before\n"
-        "assert not {'matplotlib', 'pandas', 'SALib', 'pint', 'pooch', 'tomlkit'} & set(sys.modules)\n"
+        "import os, sys, jax\n"
+        "before = dict(jax.config.values), dict(os.environ)\n"
+        f"import {', '.join(LIGHT)}\n"
+        "assert (dict(jax.config.values), dict(os.environ)) == before\n"
+        f"assert not {LATE!r} & set(sys.modules), {LATE!r} & set(sys.modules)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    done = run_python(code)
     assert done.returncode == 0, done.stderr
 
 
+def test_help_of_the_command_does_not_wait_for_jax():
+    code = (
+        "import sys\n"
+        "from fitting.cli import main\n"
+        "try:\n    main(['--help'])\n"
+        "except SystemExit:\n    assert not {'jax', 'numpy'} & set(sys.modules)\n"
+    )
+    done = run_python(code)
+    assert done.returncode == 0, done.stderr
+    assert "drivetwin" in done.stdout
+
+
 def test_nothing_works_in_single_precision():
-    code = "import twin.drives\nfrom twin.laws import ViscousFriction\nViscousFriction(1.0)\n"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    done = run_python("import twin.drives\nfrom twin.laws import ViscousFriction\nViscousFriction(1.0)\n")
     assert "InputError" in done.stderr
     assert "jax_enable_x64" in done.stderr

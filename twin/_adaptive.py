@@ -1,5 +1,6 @@
 """Error-controlled integration by diffrax, with forward sensitivities integrated together with the state."""
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -30,13 +31,14 @@ def solve_adaptive(
     if stepping.gradient == "reverse":
         return _integrate(_field(plant, reference), state, times, reference, stepping)
 
-    # The derivative rule sees one flat tuple of arrays; everything else is closed over.
+    # The derivative rule sees one flat list of arrays; everything else is closed over.
     varied, fixed = eqx.partition((plant, reference, state), eqx.is_inexact_array)
+    varied, structure = jax.tree.flatten(varied)
     settings, options = eqx.partition((times, stepping), eqx.is_array)
 
-    def rebuild(arrays: PyTree) -> tuple[AbstractPlant, AbstractReference, PyTree]:
+    def rebuild(arrays: list) -> tuple[AbstractPlant, AbstractReference, PyTree]:
         # JAX hands constants to the rules below as NumPy literals.
-        return eqx.combine(jax.tree.map(jnp.asarray, arrays), fixed)
+        return eqx.combine(jax.tree.unflatten(structure, [jnp.asarray(a) for a in arrays]), fixed)
 
     @jax.custom_jvp
     def solve(arrays: PyTree, settings: PyTree) -> tuple[PyTree, Int[Array, ""]]:
@@ -45,39 +47,46 @@ def solve_adaptive(
         return _integrate(_field(plant, reference), state, times, reference, stepping)
 
     def with_directions(
-        arrays: PyTree, directions: PyTree, axes: PyTree, settings: PyTree
+        arrays: list, directions: dict, axes: dict, settings: PyTree
     ) -> tuple[PyTree, Int[Array, ""], PyTree]:
-        """State and its derivative along several directions at once; `axes` says which leaves differ between them."""
+        """State and its derivative along several directions at once.
+
+        Directions have entries for those arrays that change, by their number; `axes` says which differ between them.
+        """
         _, reference, state = rebuild(arrays)
+        moving = {number: jnp.asarray(arrays[number]) for number in directions}
         times, stepping = eqx.combine(settings, options)
         # A direction stands for about 100 % of its parameters, so that state and sensitivity share one tolerance.
-        size = jax.vmap(lambda d: _relative_size(arrays, d), in_axes=(axes,))(directions)
+        size = jax.vmap(lambda d: _relative_size(moving, d), in_axes=(axes,))(directions)
 
-        def flow(arrays: PyTree, t: Array, y: PyTree) -> PyTree:
-            plant, reference, _ = rebuild(arrays)
+        def moved(moving: dict) -> tuple[AbstractPlant, AbstractReference, PyTree]:
+            return rebuild([moving.get(number, array) for number, array in enumerate(arrays)])
+
+        def flow(moving: dict, t: Array, y: PyTree) -> PyTree:
+            plant, reference, _ = moved(moving)
             return plant.vector_field(t, y, reference(t))
+
+        def scaled(direction: dict, scale: Array) -> dict:
+            return jax.tree.map(lambda d: d / scale, direction)
+
+        along = jax.vmap(scaled, in_axes=(axes, 0))(directions, size)
 
         def augmented(t: Array, y: Any) -> Any:
             value, sensitivity = y
-            rate, derivative = jax.linearize(lambda a, v: flow(a, t, v), arrays, value)
+            rate, derivative = jax.linearize(lambda a, v: flow(a, t, v), moving, value)
+            return rate, jax.vmap(derivative)(along, sensitivity)
 
-            def along(direction: PyTree, scale: Array, s: PyTree) -> PyTree:
-                return derivative(jax.tree.map(lambda d: d / scale, direction), s)
+        def at_start(direction: dict) -> PyTree:
+            return jax.jvp(lambda a: moved(a)[2], (moving,), (direction,))[1]
 
-            return rate, jax.vmap(along, in_axes=(axes, 0, 0))(directions, size, sensitivity)
-
-        def at_start(direction: PyTree, scale: Array) -> PyTree:
-            _, d_state = jax.jvp(lambda a: rebuild(a)[2], (arrays,), (direction,))
-            return jax.tree.map(lambda d: d / scale, d_state)
-
-        sensitivity = jax.vmap(at_start, in_axes=(axes, 0))(directions, size)
+        sensitivity = jax.vmap(at_start)(along)
         (states, sensitivities), ending = _integrate(augmented, (state, sensitivity), times, reference, stepping)
         # Saved times lead; directions go first, as vmap wants them.
         unscaled = jax.tree.map(lambda s: jnp.moveaxis(s, 1, 0) * _fit(size, s.ndim), sensitivities)
         return states, ending, unscaled
 
     @jax.custom_batching.custom_vmap
-    def along_one(arrays: PyTree, direction: PyTree, settings: PyTree) -> tuple[PyTree, Int[Array, ""], PyTree]:
+    def along_one(arrays: list, direction: dict, settings: PyTree) -> tuple[PyTree, Int[Array, ""], PyTree]:
         directions = jax.tree.map(lambda d: d[None], direction)
         states, ending, tangents = with_directions(arrays, directions, jax.tree.map(lambda _: 0, directions), settings)
         return states, ending, jax.tree.map(lambda s: s[0], tangents)
@@ -95,10 +104,13 @@ def solve_adaptive(
         flags = (jax.tree.map(lambda _: False, states), False, jax.tree.map(lambda _: True, tangents))
         return out, flags
 
-    @solve.defjvp
+    # Arrays that do not change take no part in the sensitivities: most parameters of a model are fixed.
+    @functools.partial(solve.defjvp, symbolic_zeros=True)
     def solve_jvp(primals: Any, tangents: Any) -> Any:
         arrays, settings = primals
-        states, ending, derivative = along_one(arrays, tangents[0], settings)
+        changes = enumerate(tangents[0])
+        direction = {number: d for number, d in changes if not isinstance(d, jax.custom_derivatives.SymbolicZero)}
+        states, ending, derivative = along_one(arrays, direction, settings)
         return (states, ending), (derivative, _no_tangent(ending))
 
     return solve(varied, settings)
@@ -109,16 +121,14 @@ def _field(plant: AbstractPlant, reference: AbstractReference) -> Callable:
 
 
 def _integrate(
-    field: Callable, state: PyTree[Array], times: Array, reference: AbstractReference, stepping: AdaptiveSteps
+    field: Callable,
+    state: PyTree[Array],
+    times: Array,
+    reference: AbstractReference,
+    stepping: AdaptiveSteps,
 ) -> tuple[PyTree[Array], Int[Array, ""]]:
-    controller = diffrax.PIDController(
-        rtol=stepping.rtol, atol=stepping.atol, norm=optx.max_norm, dtmin=stepping.min_step, force_dtmin=False
-    )
     # What a reference returns is continuous, so a moving switching time adds nothing of its own to a derivative.
     knots = jax.lax.stop_gradient(reference.switching_times())
-    if knots.shape[0] > 0:
-        controller = diffrax.ClipStepSizeController(controller, jump_ts=knots)
-    reverse = stepping.gradient == "reverse"
     # The integrator sees the leaves alone: empty tuples in a state (a law without memory) trip its buffers.
     leaves, structure = jax.tree.flatten(state)
 
@@ -126,6 +136,12 @@ def _integrate(
         del args
         return jax.tree.leaves(field(t, jax.tree.unflatten(structure, y)))
 
+    controller = diffrax.PIDController(
+        rtol=stepping.rtol, atol=stepping.atol, norm=optx.max_norm, dtmin=stepping.min_step, force_dtmin=False
+    )
+    if knots.shape[0] > 0:
+        controller = diffrax.ClipStepSizeController(controller, jump_ts=knots)
+    reverse = stepping.gradient == "reverse"
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(rates),
         stepping.solver,

@@ -101,22 +101,30 @@ def _one_by_one(fn: Callable[..., Any], rows: Any, numbers: np.ndarray, count: i
     return Computed(_spread(values, [n for n in numbers if n not in raised], count), raised, seconds)
 
 
+class _Named(eqx.Module):
+    """Outputs in the order of their names, which a program carries along."""
+
+    values: tuple[Any, ...]
+    """The outputs."""
+    names: tuple[str, ...] = eqx.field(static=True)
+    """Their names."""
+
+
 @eqx.filter_jit
-def _mapped(fn: Callable[..., Any], rows: Any) -> tuple[Any, tuple[str, ...]]:
-    names: tuple[str, ...] = ()
+def of_one(fn: Callable[..., Any], row: Any) -> Any:
+    """Outputs at one sample. A program of its own, so that the function is traced once for all that is made of it."""
+    values = _flat(fn(row))
+    return _Named(tuple(jax.numpy.asarray(value) for value in values.values()), tuple(values))
 
-    def one(row: Any) -> tuple[Any, ...]:
-        nonlocal names
-        values = _flat(fn(row))
-        names = tuple(values)
-        return tuple(jax.numpy.asarray(value) for value in values.values())
 
-    return jax.vmap(one)(rows), names
+@eqx.filter_jit
+def _mapped(fn: Callable[..., Any], rows: Any) -> _Named:
+    return jax.vmap(lambda row: of_one(fn, row))(rows)
 
 
 def _vmapped(fn: Callable[..., Any], rows: Any) -> Values:
-    values, names = _mapped(fn, rows)
-    return dict(zip(names, jax.device_get(values), strict=True))
+    found = _mapped(fn, rows)
+    return dict(zip(found.names, jax.device_get(found.values), strict=True))
 
 
 def _whole(fn: Callable[..., Any], rows: Any, width: int) -> Values:

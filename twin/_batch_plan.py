@@ -1,7 +1,5 @@
 """Which samples of a batch are computed together: chunks of one shape, in an order."""
 
-import functools
-import os
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -9,6 +7,7 @@ import jax
 import numpy as np
 
 from twin._checks import InputError
+from twin._cores import usable_cores
 from twin._lapack import equations_of, mentions_lapack, traced
 
 WIDEST = 256
@@ -123,38 +122,15 @@ def ordered(difficulty: Any, count: int) -> np.ndarray:
     return np.argsort(-effort, kind="stable")
 
 
-def traits(function: Callable[..., Any], row: Any) -> Traits:
-    """What the program of a function tells, from one sample; known again for the same function and shapes."""
-    leaves, structure = jax.tree.flatten((function, row))
-    shapes = [(np.shape(leaf), np.asarray(leaf).dtype.str) if _is_number(leaf) else leaf for leaf in leaves]
-    try:
-        return _traits(_Asked((structure, *shapes), function, row))
-    except TypeError as error:
-        if "unhashable" not in str(error):
-            raise
-        return _look(function, row)
+def traits(compiled: Callable[..., Any], function: Callable[..., Any], row: Any) -> Traits:
+    """What the program of a function tells.
 
-
-class _Asked:
-    """A function and a sample that are the same as others of one structure."""
-
-    def __init__(self, key: Any, function: Callable[..., Any], row: Any) -> None:
-        self.key, self.function, self.row = key, function, row
-
-    def __hash__(self) -> int:
-        return hash(self.key)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Asked) and self.key == other.key
-
-
-@functools.lru_cache(maxsize=64)
-def _traits(asked: _Asked) -> Traits:
-    return _look(asked.function, asked.row)
-
-
-def _look(function: Callable[..., Any], row: Any) -> Traits:
-    program = traced(function, jax.tree.map(jax.numpy.asarray, row))
+    Args:
+        compiled: calls a function with a sample.
+        function: the function.
+        row: a sample.
+    """
+    program = traced(compiled, function, jax.tree.map(jax.numpy.asarray, row))
     equations = list(equations_of(program))
     sizes = [_size(variable.aval) for equation in equations for variable in equation.outvars]
     loops = any(equation.primitive.name in ("while", "scan") for equation in equations)
@@ -185,11 +161,7 @@ def streams(known: Traits | None) -> int:
         return 1
     if jax.local_device_count() > 1:
         return jax.local_device_count()
-    return (os.cpu_count() or 1) if jax.default_backend() == "cpu" else 1
-
-
-def _is_number(leaf: Any) -> bool:
-    return isinstance(leaf, np.ndarray | np.generic | jax.Array)
+    return len(usable_cores()) if jax.default_backend() == "cpu" else 1
 
 
 def _power_of_two(number: int) -> int:

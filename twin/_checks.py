@@ -8,9 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-
-class InputError(ValueError):
-    """Input that cannot be used: the message names the argument, the value seen, what was expected and what to do."""
+from twin._input_error import InputError
 
 
 def require_x64() -> None:

@@ -7,7 +7,6 @@ import jax
 import jax.numpy as jnp
 import jax.scipy.signal
 import numpy as np
-import scipy.signal
 from jaxtyping import Array, ArrayLike, Complex, Float
 
 from twin._checks import InputError, require_x64
@@ -100,6 +99,8 @@ def _averaged(
 
 def _weights(window: str | tuple | np.ndarray, samples: int) -> np.ndarray:
     if isinstance(window, str | tuple):
+        import scipy.signal  # two seconds to import
+
         try:
             return np.asarray(scipy.signal.get_window(window, samples), dtype=np.float64)
         except (ValueError, TypeError) as error:

@@ -31,7 +31,7 @@ from jaxtyping import ArrayLike, Float
 
 from twin._batch_facts import facts_of
 from twin._batch_keep import AbstractKept, InMemory, OnDisk, StoreFailed
-from twin._batch_kernel import MODES, VMAP, Computed
+from twin._batch_kernel import MODES, VMAP, Computed, of_one
 from twin._batch_plan import (
     Plan,
     Traits,
@@ -113,7 +113,7 @@ def batched(
     samples, count = as_samples(samples)
     fn, retry = _as_tree(fn), None if retry is None else _as_tree(retry)
     order, good = ordered(difficulty, count), whole_rows(samples, count)
-    known = traits(fn, jax.tree.map(lambda leaf: leaf[np.argmax(good)], samples)) if mode == VMAP else None
+    known = traits(of_one, fn, jax.tree.map(lambda leaf: leaf[np.argmax(good)], samples)) if mode == VMAP else None
     asked = None if chunk_size == "auto" else int(chunk_size)
     width = min(asked, count) if asked else automatic_width(count, known)
     with contextlib.ExitStack() as stack:

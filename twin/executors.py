@@ -8,6 +8,7 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 from twin._checks import InputError
+from twin._cores import usable_cores
 from twin._loop_option import make_small_loops_one_function
 
 
@@ -25,7 +26,7 @@ def local_processes(workers: int | None = None) -> ProcessPoolExecutor:
     Raises:
         InputError: fewer than one.
     """
-    cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
+    cores = usable_cores()
     count = len(cores) if workers is None else workers
     if count < 1:
         raise InputError(f"workers must be a whole number of at least 1, but is {count}.")

@@ -7,7 +7,7 @@ import numpy as np
 
 from twin._axes import axes_or_new, grid_or_new
 from twin._checks import InputError
-from twin.sweep import Sweep
+from twin.sweep_result import Sweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +30,8 @@ def plot_sweep(sweep: Sweep, result: str | None = None, *, ax: "Axes | None" = N
         The axes.
 
     Raises:
-        InputError: several results and none named, or an unknown one.
+        InputError: several results and none named, an unknown one, one that is an array at each point, more than two
+            parameters.
     """
     if result is None:
         if len(sweep.results) > 1:
@@ -39,6 +40,17 @@ def plot_sweep(sweep: Sweep, result: str | None = None, *, ax: "Axes | None" = N
             )
         (result,) = sweep.results
     values = sweep[result]
+    if values.shape != sweep.shape:
+        raise InputError(
+            f"The result {result!r} is not one number at each point. Plot a part of to_xarray()[{result!r}]."
+        )
+    if not sweep.grid and len(sweep.parameters) > 1:
+        raise InputError("A list of points has no axes to draw. Plot columns of to_dataframe() against each other.")
+    if values.ndim > 2:
+        raise InputError(
+            f"The sweep is over {values.ndim} parameters, but a picture has two axes. Pick values of the others, as in "
+            f"to_xarray()[{result!r}].sel(...).plot()."
+        )
     ax = axes_or_new(ax, (5.6, 3.6))
     if values.ndim == 1:
         _draw_line(ax, sweep, values)

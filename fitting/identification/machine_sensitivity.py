@@ -193,7 +193,7 @@ def mode_outputs(
     stiffness = distinct.values[:, kinds.stiffness]
     dampings = samples.values[:, kinds.damping]
     places = [(part, one, threshold) for part, one in zip(parts, data, strict=True)]
-    done = in_chunks(_solved, places, stiffness, threads)
+    done = in_chunks(_solved, places, stiffness, threads=threads, store=store, executor=executor, progress=progress)
     shape, damping, missing = [], [], []
     for one, (value, paired, known, factors) in zip(data, done, strict=True):
         ratio = known[distinct.back] + np.einsum("smd,sd->sm", factors[distinct.back], dampings, optimize=True)

@@ -81,8 +81,8 @@ def study_structure(axis: BallScrewAxis | None = None) -> Structure:
         differences=np.asarray(differences),
         support_sweep=sweep(
             stiffness,
-            FirstFrequency(axis),
             {"support": np.linspace(0.5, 1.5, 41)},
+            FirstFrequency(axis),
             relative=True,
             units={"first_frequency": "Hz"},
         ),

@@ -2,10 +2,10 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 import numpy as np
-import pandas as pd
 
 from fitting.identification.load_surface import LoadSurfaceFit, fit_hyperbolic_damping, fit_root_stiffness
 from fitting.identification.peak_picking import NoCrossing, Peak, check_estimator, pick_peak
@@ -13,6 +13,9 @@ from fitting.identification.preload_sweep import PreloadSweep
 from twin._checks import InputError
 from twin.drives import RackPinionDrive
 from twin.frf import FRF
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,8 +54,10 @@ class PreloadChain:
         totals = {name: np.asarray([getattr(point.peak, name) for point in used]) for name in ("stiffness", "damping")}
         return forces, totals
 
-    def to_dataframe(self) -> pd.DataFrame:
+    def to_dataframe(self) -> "pd.DataFrame":
         """One row for each sweep: preload, forces, natural frequency, magnitude, stiffness, damping."""
+        import pandas as pd
+
         rows = []
         for point in self.points:
             peak = point.peak or Peak(*(np.nan,) * 5)

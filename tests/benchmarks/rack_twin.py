@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -57,6 +57,33 @@ def twin_jacobian(stepping: AbstractStepping) -> Callable[[np.ndarray], np.ndarr
     """
     fixed = _fixed(stepping)
     return lambda values: np.asarray(_jacobian(jnp.ones(PARAMETERS), jnp.asarray(values), *fixed))
+
+
+class Work(NamedTuple):
+    """Work of one evaluation of the vector field for one of the variants, as the compiler counts it."""
+
+    flops: float
+    """Floating-point operations [-]; a root, an exponential or a quotient counts as one."""
+    read_and_written: float
+    """Memory that its fused loops read and write [byte]."""
+
+
+def work_per_evaluation(width: int) -> Work:
+    """The `cost_analysis` of the compiled vector field, the constants of the laws included.
+
+    Args:
+        width: variants that run in step.
+    """
+    loop, reference = closed_loop(), move()
+    now = jnp.asarray(1.0)
+
+    def rates(row: Array, state: Any) -> Any:
+        return space().unpack(loop, row).vector_field(now, state, reference(now))
+
+    rows = jnp.tile(space().pack(loop), (width, 1))
+    states = jax.tree.map(lambda x: jnp.tile(x, width), loop.initial_state())
+    cost: Any = jax.jit(jax.vmap(rates)).lower(rows, states).compile().cost_analysis()
+    return Work(cost["flops"] / width, cost["bytes accessed"] / width)
 
 
 def _fixed(stepping: AbstractStepping) -> tuple:

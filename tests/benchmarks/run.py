@@ -13,7 +13,7 @@ import jax
 
 from twin._loop_option import make_small_loops_one_function
 
-SECTIONS = ("simulation", "rack_pinion", "programmes", "multistart", "swarm", "machine")
+SECTIONS = ("simulation", "rack_pinion", "programmes", "multistart", "swarm", "machine", "first_use")
 
 
 def main() -> None:
@@ -31,7 +31,7 @@ def main() -> None:
     make_small_loops_one_function()
     jax.config.update("jax_enable_x64", True)
     # Imported late: these modules make arrays.
-    from tests.benchmarks import machine_report, multistart, programmes, rack_pinion, rack_report, swarm
+    from tests.benchmarks import first_use, machine_report, multistart, programmes, rack_pinion, rack_report, swarm
     from tests.benchmarks.emps_case import dahl_case, rigid_case
     from tests.benchmarks.emps_simulation import compare, compare_best
     from tests.benchmarks.machine import machine_benchmark
@@ -68,6 +68,10 @@ def main() -> None:
         found = machine_benchmark()
         text += machine_report.as_markdown(found) + "\n"
         results["machine"] = machine_report.as_dictionary(found)
+    if "first_use" in options.sections:
+        first = first_use.first_use()
+        text += first_use.as_markdown(first) + "\n"
+        results["first_use"] = first_use.as_dictionary(first)
 
     about = machine()
     text = as_markdown(comparisons, about).replace("## Machine", text + "## Machine")

@@ -12,6 +12,7 @@ from fitting.solvers.slsqp import SLSQP
 from fitting.starts import sample_starts
 from tests.fitting.curves import Coefficients, box, noisy, two_decays
 from twin._checks import InputError
+from twin.executors import local_processes
 from twin.parameters import Parameter, ParameterSpace
 
 TRUTH = [2.0, 0.5, 1.0, 3.0]
@@ -154,3 +155,29 @@ def test_bounds_that_are_not_finite_are_named():
 def test_both_solvers_find_the_same_minimum(result):
     other = multistart(evidence(), MODEL, SPACE, starts=starts(150)[:16], solver=SLSQP(), max_steps=300)
     assert other.best.cost == pytest.approx(result.best.cost, rel=1e-8)
+
+
+def test_a_long_run_is_stored_and_goes_on_on_workers(result, tmp_path):
+    options = {"starts": starts(150), "max_steps": 200, "keep": "consistent", "progress": False}
+    spoilt = starts(150)
+    spoilt[17] = np.nan
+    first = multistart(evidence(), MODEL, SPACE, **{**options, "starts": spoilt}, store=tmp_path / "spoilt")
+    assert first.stops[17] == "not_finite"
+    folder = tmp_path / "study"
+    multistart(evidence(), MODEL, SPACE, **options, store=folder)
+    next(folder.glob("chunks/0000000-*")).unlink()
+    with local_processes(1) as pool:
+        again = multistart(evidence(), MODEL, SPACE, **options, store=folder, executor=pool)
+    np.testing.assert_array_equal(again.values, result.values)
+    np.testing.assert_array_equal(again.stops, result.stops)
+    assert set(again.results) == set(result.results)
+    np.testing.assert_array_equal(again.best.covariance, result.best.covariance)
+    with pytest.raises(InputError, match=r"the function .* was changed"):
+        multistart(evidence(), MODEL, SPACE, **{**options, "max_steps": 100}, store=folder)
+
+
+def test_no_start_that_can_be_fitted():
+    nothing = multistart(evidence(), MODEL, SPACE, starts=np.full((3, 4), np.nan))
+    assert list(nothing.stops) == ["not_finite"] * 3
+    with pytest.raises(InputError, match="All 3 starts failed"):
+        _ = nothing.best

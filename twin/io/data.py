@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from twin._checks import InputError
+from twin._user_cache import user_cache
 
 _VARIABLE = "DRIVETWIN_DATA"
 _TIMEOUT = 15.0
@@ -152,9 +153,7 @@ def _check_file(file: Path, name: str) -> None:
 
 
 def _cache() -> Path:
-    import pooch
-
-    return Path(pooch.os_cache("drivetwin"))
+    return user_cache()
 
 
 def _download(address: str, target: Path, sha256: str) -> bool:

@@ -5,8 +5,14 @@ All of them are infinitely differentiable in the value, also at zero, and approa
 which a direction of motion is no longer told from standstill.
 """
 
+import functools
+from typing import Any
+
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
+
+from twin._powers import natural_logarithm
 
 # Beyond this ratio of value to width the smooth and the sharp function are equal to the last digit, and the squares
 # below are not far from overflow.
@@ -23,8 +29,7 @@ def smooth_sign(value: Float[ArrayLike, "*batch"], width: Float[ArrayLike, ""]) 
     Returns:
         The smooth sign, in the shape of v.
     """
-    sharp, value_inside, width_inside = _guarded(value, width)
-    return jnp.where(sharp, jnp.sign(value), value_inside / jnp.sqrt(value_inside**2 + width_inside**2))
+    return _sign(jnp.asarray(value, float), jnp.asarray(width, float))
 
 
 def smooth_abs(value: Float[ArrayLike, "*batch"], width: Float[ArrayLike, ""]) -> Float[Array, "*batch"]:
@@ -39,8 +44,7 @@ def smooth_abs(value: Float[ArrayLike, "*batch"], width: Float[ArrayLike, ""]) -
     Returns:
         The smooth magnitude in the unit and shape of v.
     """
-    sharp, value_inside, width_inside = _guarded(value, width)
-    return jnp.where(sharp, jnp.abs(value), jnp.sqrt(value_inside**2 + width_inside**2))
+    return _magnitude(jnp.asarray(value, float), jnp.asarray(width, float))
 
 
 def smooth_power(
@@ -58,14 +62,15 @@ def smooth_power(
     Returns:
         The smooth power in the shape of v.
     """
-    return smooth_sign(value, width) ** 2 * smooth_abs(value, width) ** exponent
+    return smooth_sign(value, width) ** 2 * positive_power(smooth_abs(value, width), exponent)
 
 
 def positive_power(base: Float[ArrayLike, "*batch"], exponent: Float[ArrayLike, ""]) -> Float[Array, "*batch"]:
     """Power of a positive number, x^p as exp(p·ln x).
 
-    The compiler calls a library for every single power, but writes out exponentials over whole vectors: in a batch this
-    is nearly twice as fast, and as accurate as p·ln x, to a few units in the last place for moderate powers.
+    The compiler calls a library for every single power, but writes out exponentials over whole vectors, and so it does
+    this logarithm: in a batch four times as fast, and as accurate as p·ln x, to a few units in the last place for
+    moderate powers.
 
     Args:
         base: x, positive, any shape, any unit.
@@ -74,7 +79,7 @@ def positive_power(base: Float[ArrayLike, "*batch"], exponent: Float[ArrayLike, 
     Returns:
         The power in the shape of x.
     """
-    return jnp.exp(exponent * jnp.log(base))
+    return jnp.exp(exponent * natural_logarithm(base))
 
 
 def smooth_clip(
@@ -97,7 +102,48 @@ def smooth_clip(
     return jnp.asarray(2 * limit * v) / (smooth_abs(v + limit, bend) + smooth_abs(v - limit, bend))
 
 
-def _guarded(value: ArrayLike, width: ArrayLike) -> tuple[Array, Array, Array]:
+# Derivatives by rule: those of the guards would be carried along by every sensitivity.
+
+
+@jax.custom_jvp
+def _sign(value: Array, width: Array) -> Array:
+    sharp, value_inside, width_inside = _guarded(value, width)
+    return jnp.where(sharp, jnp.sign(value), value_inside / jnp.sqrt(value_inside**2 + width_inside**2))
+
+
+@functools.partial(_sign.defjvp, symbolic_zeros=True)
+def _sign_jvp(primals: Any, tangents: Any) -> Any:
+    value, width = primals
+    sign, magnitude = _sign(value, width), _magnitude(value, width)
+    share = width / magnitude
+    slopes = (share * share / magnitude, -share * sign / magnitude)
+    return sign, _along(slopes, tangents)
+
+
+@jax.custom_jvp
+def _magnitude(value: Array, width: Array) -> Array:
+    sharp, value_inside, width_inside = _guarded(value, width)
+    return jnp.where(sharp, jnp.abs(value), jnp.sqrt(value_inside**2 + width_inside**2))
+
+
+@functools.partial(_magnitude.defjvp, symbolic_zeros=True)
+def _magnitude_jvp(primals: Any, tangents: Any) -> Any:
+    value, width = primals
+    magnitude = _magnitude(value, width)
+    return magnitude, _along((_sign(value, width), width / magnitude), tangents)
+
+
+def _along(slopes: tuple[Array, Array], tangents: Any) -> Array:
+    """Sum over those arguments that change at all."""
+    terms = [
+        slope * change
+        for slope, change in zip(slopes, tangents, strict=True)
+        if not isinstance(change, jax.custom_derivatives.SymbolicZero)
+    ]
+    return functools.reduce(jnp.add, terms) if terms else jnp.zeros_like(slopes[0])
+
+
+def _guarded(value: Array, width: Array) -> tuple[Array, Array, Array]:
     # What is not selected must not overflow either: its derivative would be infinity times zero.
     sharp = jnp.abs(value) > _SHARP * width
     return sharp, jnp.where(sharp, 1.0, value), jnp.where(sharp, 1.0, width)

@@ -1,7 +1,6 @@
 """Friction given as a table of force over speed."""
 
 import equinox as eqx
-import interpax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
@@ -50,6 +49,8 @@ class TabulatedFriction(AbstractStaticFriction):
         finite("forces", self.forces, "N")
 
     def __call__(self, velocity: Float[ArrayLike, "*batch"]) -> Float[Array, "*batch"]:
+        import interpax  # only tables need it
+
         x, y = self.velocities, self.forces
         slopes = interpax.approx_df(x, y, "monotonic")
         # interpax.interp1d is the same curve, but many times slower inside of an integrator's loop.

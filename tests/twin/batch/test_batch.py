@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from twin._batch_kernel import of_one
 from twin._batch_plan import automatic_width, traits
 from twin._checks import InputError
 from twin.batch import _check, batched
@@ -155,15 +156,15 @@ def test_tables_and_structures_are_samples():
 
 def test_width_follows_the_program_and_not_the_clock():
     row = SAMPLES[0]
-    plain, looped = traits(functions.quadratic, row), traits(functions.counted, row)
+    plain, looped = traits(of_one, functions.quadratic, row), traits(of_one, functions.counted, row)
     assert not plain.loops
     assert looped.loops
     assert automatic_width(100_000, looped) == 256
     assert automatic_width(100_000, plain) == 4096
     assert automatic_width(5, plain) == 8
-    large = traits(lambda x: jnp.sum(jnp.outer(jnp.ones(2000) * x[0], jnp.ones(2000))), row)
+    large = traits(of_one, lambda x: jnp.sum(jnp.outer(jnp.ones(2000) * x[0], jnp.ones(2000))), row)
     assert automatic_width(100_000, large) == 2
-    assert traits(lambda x: jnp.linalg.eigh(jnp.outer(x, x))[0], row).lapack
+    assert traits(of_one, lambda x: jnp.linalg.eigh(jnp.outer(x, x))[0], row).lapack
 
 
 def test_results_show_themselves():

@@ -49,7 +49,7 @@ def test_energy_is_kinetic_energy_friction_and_copper_loss():
 
 
 def test_higher_gain_is_faster_and_takes_more_energy():
-    table = sweep(rigid_cycle(), cycle_performance, {GAIN: np.array([8.0, 12.0, 18.0])})
+    table = sweep(rigid_cycle(), {GAIN: np.array([8.0, 12.0, 18.0])}, cycle_performance)
     assert np.all(np.diff(table["time"]) < 0)
     assert np.all(np.diff(table["energy"]) > 0)
 

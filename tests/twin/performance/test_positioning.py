@@ -57,7 +57,7 @@ def test_is_the_measures_by_name():
 
 
 def test_sweep_of_a_gain_is_scored():
-    found = sweep(MODEL, perform, {"gain": [-1.0, 5.0, 8.0, 12.0, 20.0]}, units={"error": "m", "time": "s"})
+    found = sweep(MODEL, {"gain": [-1.0, 5.0, 8.0, 12.0, 20.0]}, perform, units={"error": "m", "time": "s"})
     np.testing.assert_array_equal(found.failed, [True, False, False, False, False])
     cost = positioning_cost(found["error"], found["energy"], found["time"])
     assert np.isnan(cost[0]) and np.all(np.isfinite(cost[1:]))

@@ -225,7 +225,16 @@ def _bar(total: int, done: int, progress: bool) -> Any:
 
     # In a file, each change of a bar is a new line.
     every = 0.1 if sys.stderr.isatty() or "ipykernel" in sys.modules else 30.0
-    return tqdm(total=total, initial=done, unit=" samples", delay=1.0, mininterval=every, disable=not progress)
+    return tqdm(
+        total=total,
+        initial=done,
+        unit=" samples",
+        delay=1.0,
+        mininterval=every,
+        maxinterval=max(every, 10.0),
+        smoothing=0,  # the mean rate: chunks come in bursts, as several run side by side
+        disable=not progress,
+    )
 
 
 @contextlib.contextmanager

@@ -174,6 +174,9 @@ def mode_outputs(
     *,
     threshold: float = 0.3,
     threads: int | None = None,
+    store: str | Path | None = None,
+    executor: Executor | None = None,
+    progress: bool = True,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """MACXP and NDD² of every reference mode in every sample.
 

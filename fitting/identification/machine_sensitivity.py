@@ -6,6 +6,8 @@ they add to the damping ratios is linear in them.
 
 import dataclasses
 from collections.abc import Sequence
+from concurrent.futures import Executor
+from pathlib import Path
 
 import numpy as np
 

@@ -75,14 +75,20 @@ class Comparison:
     def ratios(self) -> dict[str, float]:
         """How many times longer than the twin a peer takes, by what is compared; each by its shortest calls."""
         ratios = {}
-        for role in _PEERS:
-            ours, theirs = self.best_simulation(TWIN), self.best_simulation(role)
-            if ours and theirs:
-                ratios[f"{role} / twin, simulation"] = theirs.simulation.spread.min / ours.simulation.spread.min
-            ours, theirs = self.best_jacobian(TWIN), self.best_jacobian(role)
-            if ours and theirs:
-                ratios[f"{role} / twin, Jacobian"] = theirs.jacobian.spread.min / ours.jacobian.spread.min
+        for kind, role, theirs, ours in self.pairs():
+            spreads = [(row.jacobian if kind == "Jacobian" else row.simulation).spread for row in (theirs, ours)]
+            ratios[f"{role} / twin, {kind}"] = spreads[0].min / spreads[1].min
         return ratios
+
+    def pairs(self) -> list[tuple[str, str, Row, Row]]:
+        """What is compared, with whom, the fastest right entrants of the peer and of the twin."""
+        found = []
+        for role in _PEERS:
+            for kind, best in (("simulation", self.best_simulation), ("Jacobian", self.best_jacobian)):
+                ours, theirs = best(TWIN), best(role)
+                if ours and theirs:
+                    found.append((kind, role, theirs, ours))
+        return found
 
 
 def compare(case: Case, *, rounds: int = 3, scipy_methods: Iterable[str] = METHODS, extras: bool = True) -> Comparison:

@@ -42,11 +42,18 @@ class Spread:
     """Longest [s]."""
     calls: int
     """Number of calls [-]."""
+    turns: list[float]
+    """Median call of each turn, to be compared with others' in the same turn [s]."""
 
     @staticmethod
-    def of(times: Sequence[float]) -> "Spread":
-        """The spread of times, at least one [s]."""
-        return Spread(min(times), float(np.median(times)), max(times), len(times))
+    def of(times: Sequence[float], turns: Sequence[float] = ()) -> "Spread":
+        """The spread of times, at least one [s].
+
+        Args:
+            times: all of them.
+            turns: medians of turns; each time is a turn if not given.
+        """
+        return Spread(min(times), float(np.median(times)), max(times), len(times), list(turns or times))
 
 
 @dataclass(frozen=True)
@@ -76,7 +83,7 @@ def time_interleaved(
     Returns:
         Timings by name. The first call gives the answer; it counts as a timing only if it does not compile.
     """
-    answers, first, times = {}, {}, {name: [] for name in functions}
+    answers, first, times, turns = {}, {}, {name: [] for name in functions}, {name: [] for name in functions}
     for name, (function, compiles) in functions.items():
         answers[name], first[name] = _timed(function)
         if not compiles:
@@ -84,10 +91,12 @@ def time_interleaved(
     for _ in range(rounds):
         for name, (function, compiles) in functions.items():
             if accept(name, answers[name]) and (compiles or first[name] < _LONG):
-                times[name] += _round_of(function)
+                calls = _round_of(function)
+                times[name] += calls
+                turns[name].append(float(np.median(calls)))
     timings = {}
     for name, (function, compiles) in functions.items():
-        spread = Spread.of(times[name] or [_timed(function)[1]])
+        spread = Spread.of(times[name] or [_timed(function)[1]], turns[name])
         timings[name] = Timing(spread, max(first[name] - spread.min, 0.0) if compiles else 0.0, answers[name])
     return timings
 

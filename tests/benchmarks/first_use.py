@@ -14,6 +14,7 @@ import numpy as np
 
 from tests.benchmarks.entrant import Spread
 from tests.benchmarks.first_use_tasks import TASKS, TICKS, simulation
+from tests.benchmarks.summary import SummaryRow, ratio_row
 
 _ROOT = Path(__file__).parents[2]
 _TASKS = "tests.benchmarks.first_use_tasks"
@@ -107,6 +108,23 @@ def first_use(rounds: int = 5, imports: Mapping[str, str] = IMPORTS, tasks: Sequ
                 place = [] if cache == "none" else [str(Path(folder) / f"{task}-{turn}")]
                 runs[task, cache].append(json.loads(_run("-m", _TASKS, task, str(record), *place)))
     return FirstUse(rows, [_result(*key, runs) for key in runs])
+
+
+def summary_rows(found: FirstUse) -> list[SummaryRow]:
+    """The ratios for the summary: prices of imports, and what the filled cache saves."""
+    (alone,) = (row for row in found.imports if row.name == ALONE)
+    rows = [
+        ratio_row(f"import: {row.name}", ALONE, row.seconds.turns, alone.seconds.turns, "nothing to compare", most=GOAL)
+        for row in found.imports
+        if row is not alone
+    ]
+    by_cache = {(row.task, row.cache): row for row in found.results}
+    for task in dict.fromkeys(row.task for row in found.results):
+        without, filled = by_cache[task, "none"], by_cache[task, "filled"]
+        agreement = f"to {filled.difference:.0e}"
+        times = without.total.turns, filled.total.turns
+        rows.append(ratio_row(f"first {task}, compile cache filled", "without compile cache", *times, agreement))
+    return rows
 
 
 def as_markdown(found: FirstUse) -> str:

@@ -3,10 +3,39 @@
 from typing import Any
 
 from tests.benchmarks import machine_growth
-from tests.benchmarks.machine import AS_GOOD, SOLVES, MachineBenchmark, Study
+from tests.benchmarks.machine import AS_GOOD, SENSITIVITY, SOLVES, MachineBenchmark, Study
+from tests.benchmarks.summary import SummaryRow, ratio_row, refused_row
 
+PAPER = 132 * 60.0
+"""Time that Ellinger and Zaeh give for their study on 40 cores [s]."""
+ALIKE = 1e-7
+"""Difference of MACXP up to which the peers solve the same problems [-]."""
 TIMES = {"whole study": (180.0, 90.0), SOLVES: (60.0, 10.0)}
 """Time at most, and aimed for, on two cores [s]."""
+
+
+def summary_rows(found: MachineBenchmark) -> list[SummaryRow]:
+    """The ratios for the summary."""
+    study, peers = found.study, found.peers
+    agreement = f"MACXP to {peers.difference:.0e}"
+    tools = {SENSITIVITY: "SALib, SciPy eigh", SOLVES: "SciPy SLSQP, differences"}
+    rows = []
+    for step, theirs in peers.scaled(study).items():
+        what, peer = f"machine study, {step}", f"{tools[step]}, {peers.processes} processes, scaled from a part"
+        if peers.difference > ALIKE:
+            rows.append(refused_row(what, peer, f"{agreement}, limit {ALIKE:.0e}"))
+        else:
+            solved = (
+                f"; {100 * peers.as_good:.0f} % of theirs as good as ours, {100 * peers.ours_as_good:.0f} % vice versa"
+            )
+            told = agreement + (solved if step == SOLVES else "")
+            rows.append(ratio_row(what, peer, [theirs], [study.seconds[step]], told))
+    for name, (seconds, _, aim) in _judged(study).items():
+        row = ratio_row(f"machine study, {name}, time", f"goal of {aim:g} s", [seconds], [aim], "a price", most=1.0)
+        rows.append(row)
+    paper = "the paper's, 40 cores, as printed"
+    rows.append(ratio_row("machine study, whole study", paper, [PAPER], [study.total], "another machine; not run here"))
+    return rows
 
 
 def as_markdown(found: MachineBenchmark) -> str:

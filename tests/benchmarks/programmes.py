@@ -13,6 +13,7 @@ from jax import Array
 
 from fitting.solvers.slsqp import SLSQP
 from tests.benchmarks.entrant import Spread
+from tests.benchmarks.summary import SummaryRow, ratio_row
 from tests.problems.hock_schittkowski import PROBLEMS
 from tests.problems.nonlinear_programme import NonlinearProgramme, programme
 from tests.problems.programme_runs import Run, SlsqpRunner, judged, minimise_by_scipy, run_scipy
@@ -108,6 +109,21 @@ def chain() -> NonlinearProgramme:
     )
     found = run_scipy(problem, 1e-14)
     return problem._replace(optimum=found.value, solution=found.x)
+
+
+def summary_rows(found: list[Count], speeds: list[Throughput]) -> list[SummaryRow]:
+    """The ratios for the summary."""
+    ours, *peers = found
+    rows = []
+    for peer in peers:
+        told = f"twin solves {ours.solved}, peer {peer.solved} of {len(PROBLEMS)}"
+        name = "Hock and Schittkowski, evaluations (medians)"
+        rows.append(ratio_row(name, peer.solver, [peer.evaluations], [ours.evaluations], told, least=1.0))
+    for speed in speeds:
+        told = f"the optimum from {speed.batch_solved} and {speed.loop_solved} of {speed.starts} starts"
+        name = f"{speed.problem} from {speed.starts} starts"
+        rows.append(ratio_row(name, "loop of SciPy SLSQP", [speed.loop], speed.batch.turns, told))
+    return rows
 
 
 def as_markdown(found: list[Count], speeds: list[Throughput]) -> str:

@@ -18,6 +18,7 @@ from tests.benchmarks.rack_pinion import (
     Row,
 )
 from tests.benchmarks.rack_twin import work_per_evaluation
+from tests.benchmarks.summary import SummaryRow, ratio_row
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,10 @@ class Goal:
     ratio: float
     least: float | None
     """The ratio aimed for; None where there is none."""
+    peer: Row
+    """The fastest accurate entrant of the peer."""
+    twin: Row
+    """That of the twin."""
 
     @property
     def verdict(self) -> str:
@@ -67,13 +72,23 @@ def goals(rows: list[Row]) -> list[Goal]:
                 if section == "variants"
                 else f"{section}: {role} / twin"
             )
-            found.append(Goal(name, peer.each / twin.each, least))
+            found.append(Goal(name, peer.each / twin.each, least, peer, twin))
     return found
 
 
 def _best(rows: list[Row], section: str, role: str, cores: int) -> Row | None:
     fitting = [r for r in rows if (r.section, r.role, r.cores) == (section, role, cores) and r.accurate]
     return min(fitting, key=lambda row: row.each, default=None)
+
+
+def summary_rows(rows: list[Row]) -> list[SummaryRow]:
+    """The ratios for the summary; arguments as of `goals`."""
+    found = []
+    for goal in goals(rows):
+        theirs, ours = ([t / row.variants for t in row.spread.turns] for row in (goal.peer, goal.twin))
+        told = f"twin to {goal.twin.error:.0e}, peer to {goal.peer.error:.0e}"
+        found.append(ratio_row(f"rack and pinion, {goal.name}", goal.peer.name, theirs, ours, told, least=goal.least))
+    return found
 
 
 def as_markdown(rows: list[Row]) -> str:
@@ -134,6 +149,15 @@ def _line(row: Row) -> str:
 def as_dictionary(rows: list[Row]) -> dict[str, Any]:
     """The same as plain numbers and names, times in seconds."""
     return {
-        "goals": [asdict(goal) | {"verdict": goal.verdict} for goal in goals(rows)],
+        "goals": [
+            {
+                "name": g.name,
+                "ratio": g.ratio,
+                "least": g.least,
+                "verdict": g.verdict,
+                "entrants": [g.peer.name, g.twin.name],
+            }
+            for g in goals(rows)
+        ],
         "rows": [asdict(row) for row in rows],
     }

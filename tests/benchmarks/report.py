@@ -1,115 +1,82 @@
-"""What a run of the benchmarks leaves behind: a table to read, and numbers to read back."""
+"""What a run of the benchmarks leaves behind: the summary and all sections to read, and numbers to read back."""
 
 import importlib.metadata
+import json
 import os
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tests.benchmarks.emps_simulation import Comparison, Row
-from tests.benchmarks.entrant import Timing
+import jax
 
-_PACKAGES = ("jax", "jaxlib", "equinox", "diffrax", "numpy", "scipy", "casadi")
-_HEAD = (
-    "entrant",
-    "simulation min / median / max [ms] (calls)",
-    "per tick [µs]",
-    "Jacobian min / median / max [ms] (calls)",
-    "compile or build [s]",
-    "position error [m]",
-    "Jacobian error [-]",
+from tests.benchmarks import summary
+from tests.benchmarks.sections import Section
+
+_PACKAGES = (
+    *("jax", "jaxlib", "equinox", "diffrax", "optimistix", "numpy", "scipy"),
+    *("casadi", "pyswarms", "SALib", "slsqp-jax"),
 )
 
 
 def machine() -> dict[str, Any]:
-    """What the times depend on: processor, cores, systems and versions."""
+    """What the times depend on: processor, device, load, systems and versions."""
     return {
         "processor": _processor(),
         "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
-        "load_at_end": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+        "device": f"{jax.devices()[0].device_kind} ({jax.default_backend()}, {jax.device_count()})",
+        "memory_gib": _memory(),
+        "load": _load(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
         "xla_flags": os.environ.get("XLA_FLAGS", ""),
-        **{name: importlib.metadata.version(name) for name in _PACKAGES},
+        **{name: _version(name) for name in _PACKAGES},
     }
 
 
-def as_dictionary(comparison: Comparison) -> dict[str, Any]:
-    """A comparison as plain numbers and names, times in seconds."""
-    case = comparison.case
-    return {
-        "case": case.name,
-        "ticks": case.ticks,
-        "parameters": list(case.space.paths),
-        "reference": case.source,
-        "ratios": comparison.ratios(),
-        "entrants": [_row_dictionary(row) for row in comparison.rows],
-    }
+def write(folder: Path, found: Mapping[str, Section], about: Mapping[str, Any]) -> str:
+    """Write what the sections have found so far.
+
+    Args:
+        folder: for `benchmarks.json` and `benchmarks.md`.
+        found: sections by name.
+        about: the machine as the run began.
+
+    Returns:
+        The report.
+    """
+    about = {**about, "load_at_end": _load()}
+    rows = {name: section.summary for name, section in found.items()}
+    text = as_markdown([row for own in rows.values() for row in own], [s.text for s in found.values()], about)
+    together = [{"section": name, **row} for name, own in rows.items() for row in summary.as_dictionary(own)]
+    numbers = {"machine": about, "summary": together, **{name: s.results for name, s in found.items()}}
+    (folder / "benchmarks.md").write_text(text, encoding="utf-8")
+    (folder / "benchmarks.json").write_text(json.dumps(numbers, indent=2), encoding="utf-8")
+    return text
 
 
-def as_markdown(comparisons: Sequence[Comparison], about: dict[str, Any]) -> str:
-    """The report: for every comparison its ratios and its table, then the machine."""
-    lines = ["# Benchmarks", ""]
-    for comparison in comparisons:
-        case = comparison.case
-        lines += [f"## EMPS simulation: {case.name}, {case.ticks} ticks, {case.vector.size} parameters", ""]
-        lines += [f"Reference: {case.source}. Ratios of shortest calls, of the fastest right entrant of each kind:", ""]
-        lines += [f"- {name}: {ratio:.3g}" for name, ratio in comparison.ratios().items()]
-        lines += ["", *table(comparison), ""]
-    lines += ["## Machine", "", *[f"- {key}: {value}" for key, value in about.items() if value not in ("", None)], ""]
-    return "\n".join(lines)
+def as_markdown(rows: list[summary.SummaryRow], sections: list[str], about: Mapping[str, Any]) -> str:
+    """The report: summary, machine, then the sections."""
+    known = {key: value for key, value in about.items() if value not in ("", None)}
+    machine_lines = ["## Machine", "", *(f"- {key}: {value}" for key, value in known.items()), ""]
+    return "\n".join(["# Benchmarks", "", summary.as_markdown(rows), *machine_lines, *sections])
 
 
-def table(comparison: Comparison) -> list[str]:
-    """The rows of a comparison as lines of a Markdown table with aligned columns."""
-    cells = [_HEAD, *(_cells(row, comparison.case.ticks) for row in comparison.rows)]
-    widths = [max(len(row[i]) for row in cells) for i in range(len(_HEAD))]
-    lines = ["| " + " | ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) + " |" for row in cells]
-    return [lines[0], "|" + "|".join("-" * (w + 2) for w in widths) + "|", *lines[1:]]
+def _version(name: str) -> str | None:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None
 
 
-def _cells(row: Row, ticks: int) -> tuple[str, ...]:
-    building = row.entrant.build + row.simulation.compile + (row.jacobian.compile if row.jacobian else 0.0)
-    return (
-        row.entrant.name,
-        _times(row.simulation, row.right_simulation),
-        f"{1e6 * row.simulation.spread.min / ticks:.3g}",
-        _times(row.jacobian, row.right_jacobian) if row.jacobian else "",
-        f"{building:.1f}",
-        f"{row.position_error:.1e}",
-        f"{row.jacobian_error:.1e}" if row.jacobian else "",
-    )
+def _load() -> float | None:
+    """Processes that wanted a core, the mean of a minute."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
 
 
-def _times(timing: Timing, right: bool) -> str:
-    spread = timing.spread
-    times = " / ".join(f"{1e3 * t:.4g}" for t in (spread.min, spread.median, spread.max))
-    return f"{times} ({spread.calls})" + ("" if right else " not accurate enough")
-
-
-def _row_dictionary(row: Row) -> dict[str, Any]:
-    return {
-        "name": row.entrant.name,
-        "role": row.entrant.role,
-        "build_s": row.entrant.build,
-        "simulation": _timing_dictionary(row.simulation, row.right_simulation),
-        "jacobian": _timing_dictionary(row.jacobian, row.right_jacobian) if row.jacobian else None,
-        "position_error_m": row.position_error,
-        "jacobian_error": row.jacobian_error if row.jacobian else None,
-    }
-
-
-def _timing_dictionary(timing: Timing, right: bool) -> dict[str, Any]:
-    spread = timing.spread
-    return {
-        "min_s": spread.min,
-        "median_s": spread.median,
-        "max_s": spread.max,
-        "calls": spread.calls,
-        "compile_s": timing.compile,
-        "accurate": right,
-    }
+def _memory() -> float | None:
+    known = hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names
+    return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1) if known else None
 
 
 def _processor() -> str:

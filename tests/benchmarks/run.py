@@ -1,84 +1,62 @@
 """Run all benchmarks: `python -m tests.benchmarks.run --out DIR`.
 
-Writes `benchmarks.json` and `benchmarks.md` into the folder and prints the latter. Needs CasADi and pyswarms, which
-come with the `bench` extra. Takes some minutes on two cores; `--short` leaves out the whole record, `--sections`
-chooses.
+Writes `benchmarks.json` and `benchmarks.md`, and pictures of the scaling curves, into the folder and prints the table:
+a summary of all ratios, then a section each. Needs the peers, which come with the `bench` extra. Takes many minutes on
+two cores; `--short` leaves out what takes long, `--sections` chooses.
 """
 
 import argparse
 import json
+import sys
+import time
 from pathlib import Path
 
 import jax
 
+from tests.benchmarks import sections
+from tests.benchmarks.report import machine, write
 from twin._loop_option import make_small_loops_one_function
-
-SECTIONS = ("simulation", "rack_pinion", "programmes", "multistart", "swarm", "machine", "first_use")
 
 
 def main() -> None:
     """Run, print, write."""
-    parser = argparse.ArgumentParser(description="The twin against SciPy, SALib and CasADi, as ratios in one run.")
-    parser.add_argument("--out", type=Path, required=True, help="folder for benchmarks.json and benchmarks.md")
-    parser.add_argument("--ticks", type=int, default=2000, help="length of the stretch on which all entrants run")
-    parser.add_argument("--rounds", type=int, default=2, help="turns of timing")
-    parser.add_argument("--short", action="store_true", help="leave out the whole record")
-    parser.add_argument("--sections", nargs="+", choices=SECTIONS, default=SECTIONS, help="what to run")
-    parser.add_argument("--starts", type=int, default=1000, help="starts of the nonlinear programmes")
-    options = parser.parse_args()
-
     # As the command line does; before the first array is made.
     make_small_loops_one_function()
     jax.config.update("jax_enable_x64", True)
-    # Imported late: these modules make arrays.
-    from tests.benchmarks import first_use, machine_report, multistart, programmes, rack_pinion, rack_report, swarm
-    from tests.benchmarks.emps_case import dahl_case, rigid_case
-    from tests.benchmarks.emps_simulation import compare, compare_best
-    from tests.benchmarks.machine import machine_benchmark
-    from tests.benchmarks.report import as_dictionary, as_markdown, machine
+    names = sections.names()
+    parser = argparse.ArgumentParser(description="The twin against its peers, as ratios in one run.")
+    parser.add_argument("--out", type=Path, required=True, help="folder for benchmarks.json, benchmarks.md, pictures")
+    parser.add_argument("--ticks", type=int, default=2000, help="length of the stretch on which all entrants run")
+    parser.add_argument("--rounds", type=int, default=2, help="turns of timing")
+    parser.add_argument("--short", action="store_true", help="leave out the whole record and the large sizes")
+    parser.add_argument("--sections", nargs="+", choices=names, default=names, help="what to run")
+    parser.add_argument("--starts", type=int, default=1000, help="starts of the nonlinear programmes")
+    parser.add_argument("--compare", type=Path, help="benchmarks.json of another machine, for crossover batch sizes")
+    given = parser.parse_args()
+    earlier = json.loads(given.compare.read_text(encoding="utf-8")) if given.compare else None
+    options = sections.Options(given.out, given.rounds, given.ticks, given.starts, given.short, earlier)
+    print(run_all(given.sections, options))
 
-    comparisons = []
-    text, results = "", {}
-    if "simulation" in options.sections:
-        rigid = rigid_case()
-        stretch = compare(rigid.first(options.ticks), rounds=options.rounds)
-        comparisons = [stretch, compare(dahl_case().first(options.ticks), rounds=options.rounds)]
-        if not options.short:
-            comparisons.insert(0, compare_best(rigid, stretch, rounds=options.rounds))
-        results["emps_simulation"] = [as_dictionary(c) for c in comparisons]
-    if "rack_pinion" in options.sections:
-        drives = rack_pinion.all_rows(options.rounds)
-        text += rack_report.as_markdown(drives) + "\n"
-        results["rack_pinion"] = rack_report.as_dictionary(drives)
-    if "programmes" in options.sections:
-        found = programmes.counts()
-        speeds = programmes.throughputs(options.starts, options.rounds)
-        text += programmes.as_markdown(found, speeds) + "\n"
-        results["nonlinear_programmes"] = programmes.as_dictionary(found, speeds)
 
-    if "multistart" in options.sections:
-        rows = multistart.all_cases()
-        text += multistart.as_markdown(rows) + "\n"
-        results["multistart"] = multistart.as_dictionary(rows)
-    if "swarm" in options.sections:
-        ledger = swarm.swarm_ledger()
-        text += swarm.as_markdown(ledger) + "\n"
-        results["swarm"] = swarm.as_dictionary(ledger)
-    if "machine" in options.sections:
-        found = machine_benchmark()
-        text += machine_report.as_markdown(found) + "\n"
-        results["machine"] = machine_report.as_dictionary(found)
-    if "first_use" in options.sections:
-        first = first_use.first_use()
-        text += first_use.as_markdown(first) + "\n"
-        results["first_use"] = first_use.as_dictionary(first)
+def run_all(names: list[str], options: sections.Options) -> str:
+    """Run sections one after the other; what is there so far is written after each.
 
-    about = machine()
-    text = as_markdown(comparisons, about).replace("## Machine", text + "## Machine")
-    print(text)
+    Args:
+        names: of the sections.
+        options: what was asked for.
+
+    Returns:
+        The report.
+    """
     options.out.mkdir(parents=True, exist_ok=True)
-    (options.out / "benchmarks.md").write_text(text, encoding="utf-8")
-    (options.out / "benchmarks.json").write_text(json.dumps({"machine": about, **results}, indent=2), encoding="utf-8")
+    about, found, seconds, text = machine(), {}, {}, ""
+    for name in names:
+        begin = time.perf_counter()
+        found[name] = sections.run(name, options)
+        seconds[name] = round(time.perf_counter() - begin, 1)
+        print(f"{name}: {seconds[name]:.0f} s", file=sys.stderr, flush=True)
+        text = write(options.out, found, {**about, "seconds": seconds})
+    return text
 
 
 if __name__ == "__main__":

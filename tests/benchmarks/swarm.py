@@ -26,6 +26,7 @@ from fitting.solvers.levenberg_marquardt import BoundedLevenbergMarquardt
 from fitting.solvers.slsqp import SLSQP
 from tests.benchmarks.drive_case import drive_case, space_around
 from tests.benchmarks.frequency_case import frequency_case
+from tests.benchmarks.summary import SummaryRow, ratio_row
 from tests.benchmarks.swarm_cases import (
     SwarmProblem,
     ellinger_small_problem,
@@ -156,6 +157,19 @@ def _swarm(name: str, problem: SwarmProblem, target: float, particles: int, seed
             reached = True
         seconds = time.perf_counter() - clock
     return Ledger(name, f"swarm of {particles}", paid, seconds, reached)
+
+
+def summary_rows(rows: list[Ledger]) -> list[SummaryRow]:
+    """The ratios for the summary: what the swarm pays over what the cheapest gradient method pays."""
+    found = []
+    for problem in dict.fromkeys(row.problem for row in rows):
+        *ours, swarm = (row for row in rows if row.problem == problem)
+        best = min((row for row in ours if row.reached), key=lambda row: row.evaluations)
+        told = "same cost to 0.1 %" if swarm.reached else "swarm did not get there: a lower bound"
+        for name in ("evaluations", "seconds"):
+            what = f"{problem}, {best.method}, {name}"
+            found.append(ratio_row(what, swarm.method, [getattr(swarm, name)], [getattr(best, name)], told))
+    return found
 
 
 def as_markdown(rows: list[Ledger]) -> str:

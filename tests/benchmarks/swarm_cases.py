@@ -7,11 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitting.identification import machine_parts
 from fitting.identification.machine_affine import affine_machine
 from fitting.identification.machine_evidence import evidence
 from fitting.identification.machine_likeness import PartData, Shares, Unlikeness
 from fitting.identification.machine_measurement import measured_modes
+from fitting.identification.machine_part_data import PartProblem, data_from_start
 from fitting.identification.machine_sensitivity import machine_sensitivity
 from fitting.identification.machine_study import IDENTIFICATION, random_truth
 from fitting.identification.machine_unknowns import unknown_space
@@ -69,7 +69,8 @@ def ellinger_small_problem(seed: int = 1, mode: int = 7) -> SwarmProblem:
     bounds = np.asarray([(p.lower, p.upper) for p in space.parameters])[part.stiffness]
     values = np.asarray(space.values(truth))[part.stiffness]
     rows = int(mask[part.spring_of].sum())
-    leaves = machine_parts._prepared((part, one, mode, mask, values[None], bounds, rows))
+    problem = PartProblem(part, one, mode, mask, bounds, rows, SMALL)
+    leaves = data_from_start(problem, values[None])
     free = ParameterSpace([Parameter(f"share.{i}", "", 0.0, 1.0, size=1.0) for i in range(SMALL)])
     residual = Repeated(Unlikeness(PartData(*(jnp.asarray(leaf[0]) for leaf in leaves))), SMALL)
     return SwarmProblem(residual, Shares(jnp.full(SMALL, 0.5)), free, slack=1e-6)

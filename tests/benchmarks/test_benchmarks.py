@@ -12,6 +12,7 @@ import pytest
 pytest.importorskip("casadi", reason="CasADi, a peer of the benchmarks, is not installed: take the bench extra.")
 
 from tests.benchmarks.emps_case import Case, dahl_case, rigid_case
+from tests.benchmarks.emps_report import as_markdown, summary_rows
 from tests.benchmarks.emps_simulation import CVODES, SCIPY, TWIN, Comparison, compare
 from tests.benchmarks.rack_case import STATES, closed_loop, constants, move, rate, segments, space, variants
 from tests.benchmarks.rack_loop import compiled_loop
@@ -46,6 +47,13 @@ def test_jacobian_is_ten_times_faster_than_scipy_finite_differences(comparison: 
 
 def test_jacobian_is_faster_than_casadi_cvodes(comparison: Comparison):
     assert comparison.ratios()["CasADi CVODES / twin, Jacobian"] > 1
+
+
+def test_every_ratio_has_a_row_of_the_summary(comparison: Comparison):
+    rows = summary_rows(comparison)
+    assert len(rows) == len(comparison.ratios()) and sum(bool(row.goal) for row in rows) == 3
+    assert all(row.low <= row.ratio <= row.high and "limit" in row.agreement for row in rows)
+    assert comparison.case.name in as_markdown([comparison])
 
 
 @pytest.mark.parametrize("make", [rigid_case, dahl_case])

@@ -4,7 +4,16 @@ import json
 
 import pytest
 
-from tests.benchmarks.first_use import ALONE, CACHES, IMPORTS, FirstUse, as_dictionary, as_markdown, first_use
+from tests.benchmarks.first_use import (
+    ALONE,
+    CACHES,
+    IMPORTS,
+    FirstUse,
+    as_dictionary,
+    as_markdown,
+    first_use,
+    summary_rows,
+)
 
 pytestmark = pytest.mark.slow
 LIGHT = "drivetwin --help"
@@ -37,3 +46,9 @@ def test_the_section_can_be_written_down(found: FirstUse):
     text = as_markdown(found)
     assert all(name in text for name in [ALONE, LIGHT, "simulation", *CACHES])
     assert json.loads(json.dumps(as_dictionary(found))) == as_dictionary(found)
+
+
+def test_rows_of_the_summary(found: FirstUse):
+    imports, first = summary_rows(found)
+    assert LIGHT in imports.what and imports.most == 2.0
+    assert "simulation" in first.what and first.ratio > 0 and not first.goal

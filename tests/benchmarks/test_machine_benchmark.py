@@ -49,3 +49,15 @@ def test_a_machine_with_fewer_modes():
     machine = machine_growth.with_fewer_modes(reference_machine(), 45)
     assert sum(component.eigenvalues.size for component in machine.components.values()) == 45
     assert min(component.eigenvalues.size for component in machine.components.values()) >= 6
+
+
+def test_rows_of_the_summary(found: MachineBenchmark):
+    rows = {row.what: row for row in machine_report.summary_rows(found)}
+    assert len(rows) == 5
+    assert all(row.ratio is not None and row.ratio > 0 for row in rows.values())
+
+
+def test_peers_that_solve_something_else_are_refused(found: MachineBenchmark):
+    other = found._replace(peers=found.peers._replace(difference=1e-3))
+    refused = [row for row in machine_report.summary_rows(other) if row.met == "refused"]
+    assert len(refused) == 2

@@ -1,14 +1,17 @@
 """Which samples of a batch are computed together: chunks of one shape, in an order."""
 
+import functools
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from jax.extend.core import ClosedJaxpr
 
 from twin._checks import InputError
 from twin._cores import usable_cores
-from twin._lapack import equations_of, mentions_lapack, traced
+from twin._lapack import LAPACK, equations_of, traced
 
 WIDEST = 256
 """Samples computed at once on a processor: wider chunks wait longer for their slowest sample and leave the cache."""
@@ -131,10 +134,21 @@ def traits(compiled: Callable[..., Any], function: Callable[..., Any], row: Any)
         row: a sample.
     """
     program = traced(compiled, function, jax.tree.map(jax.numpy.asarray, row))
+    # JAX keeps what it has traced of a compiled function: to look through it again would take longer than to run it.
+    inner = [equation.params.get("jaxpr") for equation in program.eqns]
+    return _traits(inner[0]) if len(inner) == 1 and isinstance(inner[0], ClosedJaxpr) else _look_through(program)
+
+
+@functools.lru_cache(maxsize=64)
+def _traits(program: ClosedJaxpr) -> Traits:
+    return _look_through(program.jaxpr)
+
+
+def _look_through(program: Any) -> Traits:
     equations = list(equations_of(program))
+    names = {equation.primitive.name for equation in equations}
     sizes = [_size(variable.aval) for equation in equations for variable in equation.outvars]
-    loops = any(equation.primitive.name in ("while", "scan") for equation in equations)
-    return Traits(mentions_lapack(program), loops, max(sizes, default=8))
+    return Traits(not names.isdisjoint(LAPACK), not names.isdisjoint(("while", "scan")), max(sizes, default=8))
 
 
 def automatic_width(count: int, known: Traits | None) -> int:
@@ -169,4 +183,4 @@ def _power_of_two(number: int) -> int:
 
 
 def _size(aval: Any) -> int:
-    return int(np.prod(getattr(aval, "shape", ()), dtype=float)) * getattr(getattr(aval, "dtype", None), "itemsize", 8)
+    return math.prod(getattr(aval, "shape", ())) * getattr(getattr(aval, "dtype", None), "itemsize", 8)

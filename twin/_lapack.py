@@ -6,7 +6,7 @@ from typing import Any
 import equinox as eqx
 import jax
 
-_LAPACK = frozenset(
+LAPACK = frozenset(
     [
         "lu",
         "cholesky",
@@ -39,7 +39,7 @@ def calls_lapack(function: Callable, *arguments: Any) -> bool:
 
 def mentions_lapack(jaxpr: Any) -> bool:
     """Whether a factorisation by LAPACK is part of a traced program."""
-    return any(equation.primitive.name in _LAPACK for equation in equations_of(jaxpr))
+    return any(equation.primitive.name in LAPACK for equation in equations_of(jaxpr))
 
 
 def traced(function: Callable, *arguments: Any) -> Any:

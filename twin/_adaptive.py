@@ -1,4 +1,4 @@
-"""Error-controlled integration, with forward sensitivities integrated together with the state."""
+"""Error-controlled integration by diffrax, with forward sensitivities integrated together with the state."""
 
 import functools
 from collections.abc import Callable
@@ -12,10 +12,9 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float, Int, PyTree
 
-from twin._embedded import integrate_embedded
 from twin.plant import AbstractPlant
 from twin.references import AbstractReference
-from twin.stepping import AdaptiveSteps, EmbeddedSteps
+from twin.stepping import AdaptiveSteps
 
 # How an integration ended. Only a state that is no longer finite drives the step to its smallest length.
 COMPLETE, OUT_OF_STEPS, DIVERGED = 0, 1, 2
@@ -26,10 +25,10 @@ def solve_adaptive(
     reference: AbstractReference,
     state: PyTree[Array],
     times: Float[Array, "times"],
-    stepping: AdaptiveSteps | EmbeddedSteps,
+    stepping: AdaptiveSteps,
 ) -> tuple[PyTree[Array], Int[Array, ""]]:
     """States at the times, and how the integration ended: COMPLETE, OUT_OF_STEPS or DIVERGED."""
-    if isinstance(stepping, AdaptiveSteps) and stepping.gradient == "reverse":
+    if stepping.gradient == "reverse":
         return _integrate(_field(plant, reference), state, times, reference, stepping)
 
     # The derivative rule sees one flat list of arrays; everything else is closed over.
@@ -126,33 +125,17 @@ def _integrate(
     state: PyTree[Array],
     times: Array,
     reference: AbstractReference,
-    stepping: AdaptiveSteps | EmbeddedSteps,
+    stepping: AdaptiveSteps,
 ) -> tuple[PyTree[Array], Int[Array, ""]]:
     # What a reference returns is continuous, so a moving switching time adds nothing of its own to a derivative.
     knots = jax.lax.stop_gradient(reference.switching_times())
     # The integrator sees the leaves alone: empty tuples in a state (a law without memory) trip its buffers.
     leaves, structure = jax.tree.flatten(state)
 
-    def rates(t: Array, y: list[Array]) -> list[Array]:
+    def rates(t: Any, y: Any, args: Any) -> Any:
+        del args
         return jax.tree.leaves(field(t, jax.tree.unflatten(structure, y)))
 
-    if isinstance(stepping, AdaptiveSteps):
-        rows, ending = _by_diffrax(rates, leaves, times, knots, stepping)
-    else:
-        rows, ending = _by_embedded_pair(rates, leaves, times, knots, stepping)
-    return jax.tree.unflatten(structure, rows), ending
-
-
-def _by_embedded_pair(
-    rates: Callable, leaves: list[Array], times: Array, knots: Array, stepping: EmbeddedSteps
-) -> tuple[list[Array], Int[Array, ""]]:
-    rows, complete, stuck, _ = integrate_embedded(rates, leaves, times, knots, stepping)
-    return rows, jnp.where(complete, COMPLETE, jnp.where(stuck, DIVERGED, OUT_OF_STEPS))
-
-
-def _by_diffrax(
-    rates: Callable, leaves: list[Array], times: Array, knots: Array, stepping: AdaptiveSteps
-) -> tuple[list[Array], Int[Array, ""]]:
     controller = diffrax.PIDController(
         rtol=stepping.rtol, atol=stepping.atol, norm=optx.max_norm, dtmin=stepping.min_step, force_dtmin=False
     )
@@ -160,7 +143,7 @@ def _by_diffrax(
         controller = diffrax.ClipStepSizeController(controller, jump_ts=knots)
     reverse = stepping.gradient == "reverse"
     solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(lambda t, y, args: rates(t, y)),
+        diffrax.ODETerm(rates),
         stepping.solver,
         t0=times[0],
         t1=times[-1],
@@ -174,7 +157,7 @@ def _by_diffrax(
     )
     failed = jnp.where(solution.result == diffrax.RESULTS.dt_min_reached, DIVERGED, OUT_OF_STEPS)
     ending = jnp.where(solution.result == diffrax.RESULTS.successful, COMPLETE, failed)
-    return jax.tree.leaves(solution.ys), ending
+    return jax.tree.unflatten(structure, jax.tree.leaves(solution.ys)), ending
 
 
 def _relative_size(arrays: PyTree, direction: PyTree) -> Float[Array, ""]:

@@ -15,6 +15,7 @@ WIDEST = 256
 WIDEST_WITHOUT_LOOPS = 4096
 """The same where no sample can be slower than another."""
 WIDEST_ON_ACCELERATOR = 8192
+_NARROW = 8
 _BYTES = 2**26
 """Memory for the largest intermediate result of a chunk."""
 
@@ -30,11 +31,21 @@ class Plan(NamedTuple):
     @property
     def chunks(self) -> int:
         """Number of chunks."""
-        return -(-len(self.order) // self.width)
+        return chunk_count(len(self.order), self.width)
 
     def members(self, chunk: int) -> np.ndarray:
         """Numbers of the samples in a chunk."""
         return self.order[chunk * self.width : (chunk + 1) * self.width]
+
+
+def chunk_count(samples: int, width: int) -> int:
+    """Number of chunks of so many samples."""
+    return -(-samples // width)
+
+
+def second_width(width: int) -> int:
+    """Samples computed at once in the second try: few, as they take long."""
+    return min(_NARROW, width)
 
 
 class Traits(NamedTuple):

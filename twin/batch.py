@@ -2,6 +2,19 @@
 
 Every study runs here: chunks of one shape, compiled once, several at a time; results, status and wall time for each
 sample; kept on the disk where there is a store, so that a study that was killed goes on where it was.
+
+A store goes on with the same study alone. It is told by the function (its code, what it is closed over, the globals and
+the functions that it uses, the arrays of a module; comments do not count), the samples, their order, the seed, and the
+versions of what computes; what was changed is named. One process computes a store at a time; any may read it.
+
+Executors:
+    threads of this process, one for each core or accelerator: nothing to give.
+    worker processes: `with local_processes() as pool: batched(..., executor=pool)`, from `twin.executors`.
+    dask: `batched(..., executor=client.get_executor())`; workers that are lost are replaced by dask.
+    MPI: `mpiexec -n 9 python -m mpi4py.futures script.py`, which calls `batched(..., executor=MPIPoolExecutor())` below
+    `if __name__ == "__main__":`; one process hands out the chunks, eight compute.
+
+Workers must have the same versions, and be able to import the module that the function is in.
 """
 
 import contextlib
@@ -19,15 +32,24 @@ from jaxtyping import ArrayLike, Float
 from twin._batch_facts import facts_of
 from twin._batch_keep import AbstractKept, InMemory, OnDisk, StoreFailed
 from twin._batch_kernel import MODES, VMAP, Computed, of_one
-from twin._batch_plan import Plan, Traits, as_samples, automatic_width, ordered, rows_of, streams, traits, whole_rows
+from twin._batch_plan import (
+    Plan,
+    Traits,
+    as_samples,
+    automatic_width,
+    ordered,
+    rows_of,
+    second_width,
+    streams,
+    traits,
+    whole_rows,
+)
 from twin._batch_run import ExecutorDied, local_threads, run_chunks, window_of
 from twin._batch_worker import compute_here, compute_remotely, packed_job
 from twin._checks import InputError, require_x64
 from twin.batch_result import NOT_FINITE, RAISED, BatchResult, statuses
 from twin.store import StoredChunk
 
-_NARROW = 8
-"""Samples computed at once in the second try: few, as they take long."""
 _HOPELESS = 20
 """Samples that raised, while none was computed, after which a batch is given up."""
 
@@ -83,7 +105,8 @@ def batched(
         InputError: 64-bit mode off, samples of unequal length, an unknown mode, a chunk size below one, a function that
             is none or that returns no numbers, a store that holds another study, twenty samples that all raise.
         StudyInterrupted: the executor died, or the store cannot be written, for instance as the disk is full.
-        KeyboardInterrupt: after Ctrl-C, when the chunks that were done are stored.
+        KeyboardInterrupt: after Ctrl-C, when the chunks that were done, or are so within three seconds, are stored. A
+            thread that computes a longer one comes to its end before the program does.
     """
     require_x64()
     _check(fn, chunk_size, executor, mode, retry)
@@ -94,16 +117,15 @@ def batched(
     asked = None if chunk_size == "auto" else int(chunk_size)
     width = min(asked, count) if asked else automatic_width(count, known)
     with contextlib.ExitStack() as stack:
-        kept = _kept(
-            store, partial(facts_of, fn, retry, samples, count, order, seed, mode), samples, count, width, asked
-        )
+        facts = partial(facts_of, fn, retry, samples, count, order, seed, mode)
+        kept = _kept(store, facts, samples, count, width, asked)
         stack.callback(kept.close)
         stack.enter_context(_interruptions_explained(kept))
         plan = Plan(order, kept.width)
         run = partial(_run, samples, good, kept, executor, mode, known, progress)
         run(fn, plan, 0)
         if retry is not None and (again := np.flatnonzero(kept.status(plan.chunks) == NOT_FINITE)).size:
-            run(retry, Plan(again, min(_NARROW, kept.width)), plan.chunks)
+            run(retry, Plan(again, second_width(kept.width)), plan.chunks)
         return kept.result()
 
 
@@ -203,7 +225,16 @@ def _bar(total: int, done: int, progress: bool) -> Any:
 
     # In a file, each change of a bar is a new line.
     every = 0.1 if sys.stderr.isatty() or "ipykernel" in sys.modules else 30.0
-    return tqdm(total=total, initial=done, unit=" samples", delay=1.0, mininterval=every, disable=not progress)
+    return tqdm(
+        total=total,
+        initial=done,
+        unit=" samples",
+        delay=1.0,
+        mininterval=every,
+        maxinterval=max(every, 10.0),
+        smoothing=0,  # the mean rate: chunks come in bursts, as several run side by side
+        disable=not progress,
+    )
 
 
 @contextlib.contextmanager

@@ -15,7 +15,7 @@ from twin._constant import run_sampled_loop, solve_constant
 from twin.control.closed_loop import SampledLoop
 from twin.plant import AbstractPlant
 from twin.references import AbstractReference
-from twin.stepping import AbstractStepping, AdaptiveSteps, ConstantSteps, EmbeddedSteps
+from twin.stepping import AbstractStepping, AdaptiveSteps, ConstantSteps
 from twin.trajectory import SimulationStatus, Trajectory
 
 
@@ -37,8 +37,8 @@ def simulate(
         reference: function of time that returns the system's inputs (a plant's inputs, a loop's `MotionPoint`).
         times: times at which the trajectory is wanted [s]; for a sampled loop its ticks, one period apart.
         initial_state: state of the plant at `times[0]`; its own `initial_state()` if not given.
-        stepping: `AdaptiveSteps` (the default for plants), `EmbeddedSteps` (faster where few times are saved) or
-            `ConstantSteps` (the default and only way for sampled loops, whose right-hand side jumps at every tick).
+        stepping: `AdaptiveSteps` (the default for plants) or `ConstantSteps` (the default and only way for sampled
+            loops, whose right-hand side jumps at every tick).
 
     Returns:
         The trajectory. A run that failed is marked by its status and holds NaN; one that is less accurate than asked
@@ -68,7 +68,7 @@ def simulate(
     if isinstance(stepping, ConstantSteps):
         states, estimate = solve_constant(system, reference, state, times, stepping)
         status = _judge(estimate)
-    elif isinstance(stepping, (AdaptiveSteps, EmbeddedSteps)):
+    elif isinstance(stepping, AdaptiveSteps):
         states, ending = solve_adaptive(system, reference, state, times, stepping)
         estimate = jnp.asarray(jnp.nan)
         status = SimulationStatus.where(
@@ -76,9 +76,7 @@ def simulate(
         )
         status = SimulationStatus.where(ending == DIVERGED, SimulationStatus.not_finite, status)
     else:
-        raise InputError(
-            f"stepping must be AdaptiveSteps, EmbeddedSteps or ConstantSteps, but is {type(stepping).__name__}."
-        )
+        raise InputError(f"stepping must be AdaptiveSteps or ConstantSteps, but is {type(stepping).__name__}.")
     inputs = jax.vmap(reference)(times)
     outputs = jax.vmap(system.outputs)(times, states, inputs)
     return _trajectory(times, states, outputs, status, estimate)

@@ -67,39 +67,6 @@ class AdaptiveSteps(AbstractStepping):
             raise InputError(f'gradient must be "forward" or "reverse", but is {self.gradient!r}.')
 
 
-class EmbeddedSteps(AbstractStepping):
-    """Steps of an embedded Runge-Kutta pair under error control that end at every saved time: the fastest for what-ifs.
-
-    Where saved times are no denser than the steps that accuracy and stability ask for, a run takes a fraction of the
-    time of `AdaptiveSteps`, above all in a batch (`jax.vmap`). Between dense saved times its steps are needlessly
-    short. Sensitivities are integrated with the state and count in the error norm, as there; forward mode only.
-
-    Raises:
-        InputError: if a tolerance is not positive, or the solver's last stage is not the first one of the next step.
-    """
-
-    rtol: Float[Array, ""] = eqx.field(converter=as_scalar, default=1e-5)
-    """Relative tolerance of states and sensitivities, on the local error of each step."""
-    atol: Float[Array, ""] = eqx.field(converter=as_scalar, default=1e-8)
-    """Absolute tolerance, in the unit of each state."""
-    solver: diffrax.AbstractERK = eqx.field(static=True, default_factory=diffrax.Bosh3)
-    """Explicit Runge-Kutta pair; its tableau is diffrax's: Bosh3, Tsit5, Dopri5."""
-    max_steps: int = eqx.field(static=True, default=100_000)
-    """Steps after which the run is given up and marked."""
-    min_step: float = eqx.field(static=True, default=1e-12)
-    """Step length [s] below which the run is given up: one diverging lane must not stall its batch."""
-
-    def __check_init__(self):
-        positive("rtol", self.rtol)
-        positive("atol", self.atol)
-        tableau: Any = self.solver.tableau
-        if not tableau.fsal:
-            raise InputError(
-                f"solver must evaluate its last stage where the next step begins, but {type(self.solver).__name__} "
-                "does not. Take diffrax's Bosh3, Tsit5 or Dopri5, or AdaptiveSteps for any other."
-            )
-
-
 def stage_times(stepping: ConstantSteps, start: Array, length: Array) -> Float[Array, "substeps stages"]:
     """The times at which `runge_kutta_steps` asks for the vector field [s].
 
@@ -155,7 +122,7 @@ def runge_kutta_steps(
         for stage, row in enumerate(tableau.a_lower, start=1):
             stages.append(rate(stage, _advance(state, step, row, stages)))
         state = _advance(state, step, tableau.b_sol, stages)
-        error = jax.lax.stop_gradient(combine_stages(step, tableau.b_error, stages))
+        error = jax.lax.stop_gradient(_combine(step, tableau.b_error, stages))
         total = jax.tree.map(lambda sum_, e: sum_ + jnp.abs(e), total, error)
         return (state, stages[-1], total), None
 
@@ -168,18 +135,11 @@ def runge_kutta_steps(
     return carry[0], carry[2]
 
 
-def combine_stages(step: Array, weights: ArrayLike, stages: list[PyTree[Array]]) -> PyTree[Array]:
-    """Step length times the weighted sum of the stages, those of zero weight left out.
-
-    Args:
-        step: length of the step [s].
-        weights: one for each stage, a row of a tableau.
-        stages: values of the vector field.
-    """
+def _combine(step: Array, weights: ArrayLike, stages: list) -> PyTree[Array]:
     used = [(float(w), k) for w, k in zip(np.asarray(weights), stages, strict=True) if w != 0.0]
     factors = [w for w, _ in used]
     return jax.tree.map(lambda *k: step * sum(w * x for w, x in zip(factors, k, strict=True)), *[k for _, k in used])
 
 
 def _advance(state: PyTree[Array], step: Array, weights: ArrayLike, stages: list) -> PyTree[Array]:
-    return jax.tree.map(jnp.add, state, combine_stages(step, weights, stages))
+    return jax.tree.map(jnp.add, state, _combine(step, weights, stages))

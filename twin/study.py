@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from twin._batch_plan import chunk_count, second_width
 from twin._checks import InputError
-from twin.batch_result import DONE, STATUS, WAITING, BatchResult, blank
+from twin.batch_result import DONE, NOT_FINITE, STATUS, WAITING, BatchResult, blank
 from twin.store import Store, StoredChunk
 
 
@@ -21,13 +22,20 @@ class StudyStatus(NamedTuple):
     counts: dict[str, int]
     """Samples by what became of them, see `twin.batch_result.STATUS`."""
     chunks: tuple[int, int]
-    """Chunks that are there, and those of the whole study without a second try."""
+    """Chunks of the first try that are there, and how many they are in all."""
+    second_try: tuple[int, int]
+    """The same of the second try, of samples whose outputs were not finite; it begins after the first."""
     damaged: int
     """Chunks that do not agree with their checksum; they are computed again when the study goes on."""
     seconds: float
     """Computing time of the samples that are there [s]."""
     versions: dict[str, str]
     """Versions of what computed it."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing is left to compute."""
+        return self.chunks[0] == self.chunks[1] and self.second_try[0] == self.second_try[1]
 
     def __str__(self) -> str:
         total, waiting = sum(self.counts.values()), self.counts[STATUS[WAITING]]
@@ -36,6 +44,8 @@ class StudyStatus(NamedTuple):
             f"{total - waiting:,} of {total:,} samples ({self.chunks[0]:,} of {self.chunks[1]:,} chunks), "
             f"{self.seconds:.3g} s of computing",
         ]
+        if self.second_try[1]:
+            lines.append(f"  second try: {self.second_try[0]:,} of {self.second_try[1]:,} chunks")
         lines += [
             f"  {name.replace('_', ' ')}: {count:,}"
             for name, count in self.counts.items()
@@ -44,7 +54,7 @@ class StudyStatus(NamedTuple):
         if self.damaged:
             lines.append(f"  damaged chunks: {self.damaged}; they are computed again when the study goes on")
         lines.append("  " + ", ".join(f"{name} {version}" for name, version in self.versions.items()))
-        lines.append("Complete." if not waiting else "The same call with the same store goes on.")
+        lines.append("Complete." if self.complete else "The same call with the same store goes on.")
         return "\n".join(lines)
 
 
@@ -73,13 +83,17 @@ def study_status(folder: str | Path) -> StudyStatus:
     """
     store = Store.open(folder)
     gathered = gathered_from(store, only=())
-    number = np.bincount(gathered.status, minlength=len(STATUS))
     size = int(store.manifest["chunks"]["size"])
+    first = chunk_count(store.count, size)
+    tried = gathered_from(store, only=(), chunks=first)
+    again = int(np.count_nonzero(tried.status == NOT_FINITE)) if store.manifest["retry"] else 0
+    number = np.bincount(gathered.status, minlength=len(STATUS))
     return StudyStatus(
         store.folder,
         store.manifest["function"]["name"],
         dict(zip(STATUS, number.tolist(), strict=True)),
-        (gathered.chunks, -(-store.count // size)),
+        (tried.chunks, first),
+        (gathered.chunks - tried.chunks, chunk_count(again, second_width(size))),
         gathered.damaged,
         float(gathered.seconds.sum()),
         store.manifest["versions"],
@@ -160,15 +174,18 @@ class StoredOutputs(Mapping[str, np.ndarray]):
         return len(list(iter(self)))
 
 
-def gathered_from(store: Store, only: tuple[str, ...] | None = None) -> Gathered:
+def gathered_from(store: Store, only: tuple[str, ...] | None = None, chunks: int | None = None) -> Gathered:
     """All chunks of a store that are whole.
 
     Args:
         store: the store.
         only: names of the outputs wanted; None for all.
+        chunks: number of the first chunks wanted; None for all.
     """
     gathered = Gathered(store.count, only)
-    for _, file in sorted(store.files().items()):
+    for number, file in sorted(store.files().items()):
+        if chunks is not None and number >= chunks:
+            break
         content = store.read(file)
         if content is None:
             gathered.damaged += 1

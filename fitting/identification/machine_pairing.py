@@ -1,20 +1,25 @@
 """The modes of a machine at many samples of its stiffnesses, and which of them belongs to which reference mode."""
 
+import contextlib
+import dataclasses
 import functools
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeVar
+from concurrent.futures import Executor, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from threadpoolctl import threadpool_limits
 
 from fitting.identification.machine_affine import AffineMachine
 from fitting.identification.machine_evidence import Evidence
-from fitting.shared_out import shared_out
+from twin._checks import InputError
+from twin._cores import usable_cores
+from twin.batch import batched
 from twin.correlation import assign
-
-Place = TypeVar("Place")
 
 CHUNK = 64
 """Samples solved at once: their matrices stay in the cache."""
@@ -68,27 +73,71 @@ def paired_samples(
 
 
 def in_chunks(
-    function: Callable[[Place, np.ndarray], tuple[np.ndarray, ...]],
-    places: Sequence[Place],
+    function: Callable[[Any, np.ndarray], tuple[np.ndarray, ...]],
+    places: Sequence[Any],
     samples: np.ndarray,
+    *,
     threads: int | None = None,
+    store: str | Path | None = None,
+    executor: Executor | None = None,
+    progress: bool = True,
 ) -> list[tuple[np.ndarray, ...]]:
-    """Results of a function for all samples at several places, `CHUNK` samples at a time, several chunks side by side.
+    """Results of a function for all samples at several places, by `twin.batch.batched`, `CHUNK` samples at a time.
 
     Args:
         function: from a place and some samples to arrays with one row for each sample.
         places: what differs from one axis position to the next.
         samples: all samples, one a row.
-        threads: chunks done side by side; the number of cores if not given.
+        threads: chunks done side by side in this process; the number of cores if not given.
+        store: folder that keeps the chunks.
+        executor: where they are done; None for threads of this process.
+        progress: show a bar.
 
     Returns:
         The arrays of each place, with all samples.
+
+    Raises:
+        InputError: a sample at which the function fails.
     """
-    starts = range(0, len(samples), CHUNK)
-    tasks = [(place, samples[i : i + CHUNK]) for place in places for i in starts]
-    done = iter(shared_out(lambda task: function(*task), tasks, threads))
-    each = [[next(done) for _ in starts] for _ in places]
-    return [tuple(np.concatenate(arrays) for arrays in zip(*chunks, strict=True)) for chunks in each]
+    pool = ThreadPoolExecutor(threads or len(usable_cores())) if executor is None else None
+    # Each matrix is small: a library that splits it among all cores only waits for them.
+    with threadpool_limits(1, user_api="blas"), pool or contextlib.nullcontext():
+        found = batched(
+            _AtPlaces(function, tuple(places)),
+            samples,
+            mode="chunk",
+            chunk_size=CHUNK,
+            store=store,
+            executor=pool or executor,
+            progress=progress,
+        )
+    if found.messages:
+        raise InputError(f"The modes of some samples could not be computed. {found.message}")
+    outputs = dict(found.outputs)
+    each = len(outputs) // len(places)
+    return [tuple(outputs[f"{k}.{i}"] for i in range(each)) for k in range(len(places))]
+
+
+@dataclasses.dataclass(frozen=True)
+class _AtPlaces:
+    """A function at all places."""
+
+    function: Callable[[Any, np.ndarray], tuple[np.ndarray, ...]]
+    """The function."""
+    places: tuple[Any, ...]
+    """The places."""
+
+    def __call__(self, samples: np.ndarray) -> dict[str, np.ndarray]:
+        """Its results, named by place and number.
+
+        Args:
+            samples: one a row.
+        """
+        return {
+            f"{k}.{i}": array
+            for k, place in enumerate(self.places)
+            for i, array in enumerate(self.function(place, samples))
+        }
 
 
 def _paired(alike: Float[np.ndarray, "samples n references"], threshold: float) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,8 @@ out of the whole study.
 
 import dataclasses
 from collections.abc import Sequence
+from concurrent.futures import Executor
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -88,6 +90,9 @@ def screen_machine(
     confidence: float = 0.95,
     resamples: int = 100,
     threads: int | None = None,
+    store: str | Path | None = None,
+    executor: Executor | None = None,
+    progress: bool = True,
 ) -> MachineScreening:
     """Bound the total effect of every unknown parameter on MACXP and NDD² of every reference mode.
 
@@ -111,6 +116,9 @@ def screen_machine(
         confidence: probability that the intervals are made for.
         resamples: bootstrap samples that the intervals come from.
         threads: positions and samples solved side by side; the number of cores if not given.
+        store: folder that keeps what was solved, so that a study that was killed goes on.
+        executor: where it is solved, see `twin.batch.batched`; None for threads of this process.
+        progress: show a bar.
 
     Returns:
         The bounds, and what is left to study.
@@ -126,7 +134,9 @@ def screen_machine(
     require_modes(parts, data)
     samples = derivative_samples(space, n, seed=seed)
     places = [(part, one, least_macxp) for part, one in zip(parts, data, strict=True)]
-    done = in_chunks(_differentiated, places, samples, threads)
+    done = in_chunks(
+        _differentiated, places, samples, threads=threads, store=store, executor=executor, progress=progress
+    )
     macxp, ndd, d_macxp, d_ndd, paired = (np.concatenate(arrays, axis=1) for arrays in zip(*done, strict=True))
     problems = tuple(label for one in data for label in one.labels)
     measures = measures_from_derivatives(

@@ -6,6 +6,8 @@ they add to the damping ratios is linear in them.
 
 import dataclasses
 from collections.abc import Sequence
+from concurrent.futures import Executor
+from pathlib import Path
 
 import numpy as np
 
@@ -174,6 +176,9 @@ def mode_outputs(
     *,
     threshold: float = 0.3,
     threads: int | None = None,
+    store: str | Path | None = None,
+    executor: Executor | None = None,
+    progress: bool = True,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """MACXP and NDD² of every reference mode in every sample.
 
@@ -193,7 +198,7 @@ def mode_outputs(
     stiffness = distinct.values[:, kinds.stiffness]
     dampings = samples.values[:, kinds.damping]
     places = [(part, one, threshold) for part, one in zip(parts, data, strict=True)]
-    done = in_chunks(_solved, places, stiffness, threads)
+    done = in_chunks(_solved, places, stiffness, threads=threads, store=store, executor=executor, progress=progress)
     shape, damping, missing = [], [], []
     for one, (value, paired, known, factors) in zip(data, done, strict=True):
         ratio = known[distinct.back] + np.einsum("smd,sd->sm", factors[distinct.back], dampings, optimize=True)

@@ -20,7 +20,7 @@ from tests.benchmarks.entrant import Spread, time_interleaved
 from tests.benchmarks.rack_case import nominal, variants
 from tests.benchmarks.rack_loop import compiled_loop
 from tests.benchmarks.rack_twin import twin_batch, twin_jacobian, twin_run
-from twin.stepping import AbstractStepping, AdaptiveSteps, ConstantSteps, EmbeddedSteps
+from twin.stepping import AbstractStepping, AdaptiveSteps, ConstantSteps
 
 TWIN, CVODES, CVODES_COMPILED = "twin", "CasADi CVODES", "CasADi CVODES, compiled"
 SCIPY, ODEINT, LOOP = "SciPy solve_ivp", "SciPy odeint", "C loop"
@@ -103,7 +103,6 @@ def _single(rounds: int) -> list[Row]:
         f"{type(s).__name__}, rtol 1e-6": AdaptiveSteps(solver=s) for s in _SOLVERS
     }
     steppings |= _constant(10, 20)
-    steppings |= _embedded(5e-5)
     entries = {
         f"twin, {name}": _entry(TWIN, partial(twin_run, s), values, compiles=True) for name, s in steppings.items()
     }
@@ -121,7 +120,7 @@ def _batch(rounds: int) -> list[Row]:
     exact = np.stack([tight(row) for row in values[:_CHECKED]])
     cores = sorted({1, os.cpu_count() or 1})
     entries = {}
-    steppings = _constant(SUBSTEPS) | _embedded(3e-5) | {"Tsit5, rtol 1e-6": AdaptiveSteps(solver=diffrax.Tsit5())}
+    steppings = _constant(SUBSTEPS) | {"Tsit5, rtol 1e-6": AdaptiveSteps(solver=diffrax.Tsit5())}
     for name, stepping in steppings.items():
         for n in cores:
             make = partial(twin_batch, stepping, WIDTH, n)
@@ -145,7 +144,7 @@ def _jacobian(rounds: int) -> list[Row]:
         f"Dopri8, rtol {rtol}": AdaptiveSteps(rtol=float(rtol), atol=1e-3 * float(rtol))
         for rtol in ("1e-4", "1e-5", "1e-6")
     }
-    steppings |= _constant(20) | _embedded(5e-5, diffrax.Tsit5())
+    steppings |= _constant(20)
     entries = {
         f"twin, {n}": _entry(TWIN, partial(twin_jacobian, s), values, compiles=True) for n, s in steppings.items()
     }
@@ -160,12 +159,6 @@ def _jacobian(rounds: int) -> list[Row]:
 
 def _constant(*substeps: int) -> dict[str, AbstractStepping]:
     return {f"Bosh3, {n} steps": ConstantSteps(substeps=n, rtol=_UNJUDGED) for n in substeps}
-
-
-def _embedded(rtol: float, solver: diffrax.AbstractERK | None = None) -> dict[str, AbstractStepping]:
-    pair = solver or diffrax.Bosh3()
-    name = f"{type(pair).__name__} to every saved time, rtol {rtol:g}"
-    return {name: EmbeddedSteps(rtol=rtol, atol=1e-3 * rtol, solver=pair)}
 
 
 def _cvodes(settings: Mapping[str, dict]) -> dict[str, tuple[str, dict]]:

@@ -130,8 +130,8 @@ def _limits(rows: list[Row]) -> list[str]:
         if row.name.startswith(f"twin, Bosh3, {SUBSTEPS} steps") and row.section == "variants":
             lines.append(f"{row.name}: {1e-9 * work.flops * evaluations / row.each:.2g} GFlop/s.")
     lines.append(
-        "Roots and quotients, some 24 and 19 an evaluation, bound the batch now that logarithms are vector arithmetic; "
-        "error control needs half the evaluations, but variants wait for each other at every saved time and each "
+        "Logarithms are vector arithmetic; what is left of an evaluation is, by its operations, mostly some 24 roots "
+        "and 19 quotients. Error control would need half the evaluations, but variants wait for each other and each "
         "evaluates the reference at its own times. Within diffrax a single run is bound by what surrounds the "
         "evaluations. The Jacobian is bound by the arithmetic of the directions."
     )

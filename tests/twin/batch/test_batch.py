@@ -85,6 +85,37 @@ def test_failed_samples_are_marked_and_the_others_unchanged():
     assert "samples.2" in found.to_dataframe()
 
 
+@settings(deadline=None, max_examples=25)
+@given(high=st.lists(st.integers(0, 99), max_size=100, unique=True), size=st.sampled_from([8, 32, 100]))
+def test_any_samples_may_raise(high, size):
+    samples = SAMPLES[:100].copy()
+    samples[high, 0] = 0.9995
+    if len(high) >= 20:
+        samples = np.concatenate([SAMPLES[100:200], samples])  # at first some that do not
+        high = [n + 100 for n in high]
+    found = quiet(functions.refuses_high, samples, chunk_size=size)
+    assert set(found.messages) == set(high) == set(np.flatnonzero(found.status == RAISED).tolist())
+    good = found.success
+    np.testing.assert_allclose(found.value[good], np.log(samples[good]).sum(axis=1), rtol=1e-13)
+
+
+def test_one_sample_that_raises_costs_few_tries():
+    tries = 0
+
+    def whole(rows):
+        nonlocal tries
+        tries += 1
+        if (rows[:, 0] > 0.999).any():
+            raise RuntimeError("too high")
+        return rows[:, 0]
+
+    samples = SAMPLES[:256].copy()
+    samples[77, 0] = 0.9995
+    found = quiet(whole, samples, mode="chunk", chunk_size=256)
+    assert list(found.messages) == [77]
+    assert tries <= 10
+
+
 def test_infinity_is_a_sample():
     found = quiet(lambda x: 1.0 / x, np.array([1.0, np.inf, np.nan]))
     np.testing.assert_array_equal(found.value, [1.0, 0.0, np.nan])

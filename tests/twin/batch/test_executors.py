@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import batch_functions as functions
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -105,6 +106,30 @@ def test_a_function_that_the_worker_cannot_read_is_named():
     found = compute_remotely(b"no function", np.ones((1, 3)), np.ones(1, bool), 1)
     assert isinstance(found.error, InputError)
     assert "A worker cannot read the function" in str(found.error)
+
+
+def test_threads_of_the_caller_run_lapack_one_at_a_time():
+    at_work, most, submitted = 0, 0, threading.Lock()
+
+    class Counting(ThreadPoolExecutor):
+        def submit(self, work, /, *arguments):
+            nonlocal at_work, most
+            with submitted:
+                at_work += 1
+                most = max(most, at_work)
+            future = super().submit(work, *arguments)
+            future.add_done_callback(done)
+            return future
+
+    def done(_):
+        nonlocal at_work
+        with submitted:
+            at_work -= 1
+
+    with Counting(4) as pool:
+        found = quiet(lambda x: jnp.linalg.eigh(jnp.outer(x, x))[0], RNG.random((40, 3)), chunk_size=4, executor=pool)
+    assert found.success.all()
+    assert most == 1
 
 
 def test_workers_must_be_at_least_one():

@@ -13,22 +13,24 @@ import pytest
 
 from twin.batch import StudyInterrupted, batched
 from twin.batch_result import NOT_FINITE
-from twin.study import read_study
+from twin.study import read_study, study_status
 
 HERE = Path(__file__).parent
 SAMPLES = np.random.default_rng(6).random((50, 2))
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="kills by SIGKILL")
-def test_twenty_kills(tmp_path):
-    with functions.started(HERE / "killed_study.py", tmp_path / "study", 20) as process:
+@pytest.mark.parametrize("kills", [4, pytest.param(20, marks=pytest.mark.slow)])
+def test_kills(tmp_path, kills):
+    with functions.started(HERE / "killed_study.py", tmp_path / "study", kills) as process:
         printed, errors = process.communicate(timeout=300)
     assert process.returncode == 0, errors
     found = json.loads(printed)
-    assert sum(found["killed"]) >= 15
+    assert sum(found["killed"]) >= 0.75 * kills
     assert found["aside"] >= 3  # amid writing samples, manifest, chunk
     assert found["chunks"] == sorted(found["chunks"])
-    assert found["chunks"][4] == 0 < found["chunks"][-1]
+    assert found["chunks"][4] == 0
+    assert kills == 4 or found["chunks"][-1] > 0
     assert found["resumed"] == found["uninterrupted"]
 
 
@@ -86,6 +88,9 @@ def test_the_second_try_goes_on_as_well(tmp_path, monkeypatch):
                 batched(low_alone, SAMPLES, store=folder, **options)
             except StudyInterrupted:
                 told += 1
+            assert study_status(folder).complete == (told <= call)
+            if call == first:
+                assert f"second try: 1 of {again} chunks" in str(study_status(folder))
     assert told == first + again - 1
     assert batched(low_alone, SAMPLES, store=folder, **options).digest == whole.digest
     assert read_study(folder).digest == whole.digest

@@ -14,8 +14,14 @@ pytest.importorskip("casadi", reason="CasADi, a peer of the benchmarks, is not i
 from tests.benchmarks.emps_case import Case, dahl_case, rigid_case
 from tests.benchmarks.emps_report import as_markdown, summary_rows
 from tests.benchmarks.emps_simulation import CVODES, SCIPY, TWIN, Comparison, compare
+from tests.benchmarks.entrant import Spread
+from tests.benchmarks.programmes import Count, Throughput
+from tests.benchmarks.programmes import summary_rows as programme_rows
 from tests.benchmarks.rack_case import STATES, closed_loop, constants, move, rate, segments, space, variants
 from tests.benchmarks.rack_loop import compiled_loop
+from tests.benchmarks.rack_pinion import CVODES as CVODES_RACK
+from tests.benchmarks.rack_pinion import Row
+from tests.benchmarks.rack_report import summary_rows as rack_summary
 
 pytestmark = pytest.mark.slow
 
@@ -103,3 +109,21 @@ def test_the_c_loop_gets_the_same_equations(rack_states: list[tuple[Any, ...]]):
     for _, wanted, state, values in rack_states:
         theirs = rate(state.tolist(), wanted, constants(values.tolist()), np.sqrt)
         np.testing.assert_allclose(loop.rate(state, np.asarray(wanted), values), theirs, rtol=1e-10, atol=1e-10)
+
+
+def test_rows_of_the_rack_and_pinion_are_per_variant():
+    times = {TWIN: [2.0, 4.0], CVODES_RACK: [6.0, 6.0]}
+    rows = [
+        Row("variants", role, role, 1, 4 if role == TWIN else 1, Spread.of(turns), 0.0, 1e-5, 1e-9, True)
+        for role, turns in times.items()
+    ]
+    row, *_ = rack_summary(rows)
+    assert (row.ratio, row.low, row.high, row.least) == (9.0, 6.0, 12.0, 5.0)
+
+
+def test_rows_of_the_programmes():
+    counts = [Count("twin", 9, 0, 10.0, 11.0), Count("SciPy", 8, 1, 12.0, 13.0)]
+    speed = Throughput("HS71", 4, Spread.of([1.0, 2.0]), 0.5, 8.0, 4, 3)
+    evaluations, loop = programme_rows(counts, [speed])
+    assert evaluations.ratio == 1.2 and evaluations.met == "yes"
+    assert loop.ratio == 6.0 and "4 and 3 of 4" in loop.agreement

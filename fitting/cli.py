@@ -36,6 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not options.reads:
             options.out.mkdir(parents=True, exist_ok=True)
         print(options.run(options.out))
+    except BrokenPipeError:  # whoever reads has had enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (InputError, OSError) as error:
         return _told(str(error), 2)
     except StudyInterrupted as error:

@@ -29,9 +29,9 @@ class FitsFromStarts:
     """The solver."""
     max_steps: int
     """Steps after which a fit is given up."""
-    width: int
+    width: int = dataclasses.field(metadata={"changes_results": False})
     """Fits that run in step."""
-    threads: int | None
+    threads: int | None = dataclasses.field(metadata={"changes_results": False})
     """Sets of lanes that run side by side."""
     keep: Keep | None = None
     """Whose whole outcome to keep, see `solve_lanes`; not where the fits run in workers."""

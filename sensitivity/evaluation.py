@@ -70,7 +70,7 @@ def evaluate(
     )
     if found.messages:
         raise InputError(f"The function failed at some samples. {found.message}")
-    outputs = dict(found.outputs)
+    outputs = dict(found.outputs.items())
     return outputs[_BARE] if list(outputs) == [_BARE] else outputs
 
 

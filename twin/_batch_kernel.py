@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -54,43 +55,51 @@ def compute(fn: Callable[..., Any], mode: str, rows: Any, good: np.ndarray, widt
         values = _vmapped(fn, picked) if mode == VMAP else _whole(fn, picked, width)
         return {name: value[: len(chosen)] for name, value in values.items()}
 
-    values, raised = _isolated(at, numbers)
+    # What a compiled program raises as it runs is of a sample; anything else is of the function. Python tells neither.
+    values, raised = _isolated(partial(_tried, at, RuntimeError if mode == VMAP else Exception), numbers)
     seconds = np.where(good, (time.perf_counter() - start) / numbers.size, 0.0)
     return Computed(_spread(values, [n for n in numbers if n not in raised], count), raised, seconds)
 
 
-def _isolated(at: Callable[[np.ndarray], Values], numbers: np.ndarray) -> tuple[Values, dict[int, str]]:
+def _isolated(
+    tried: Callable[[np.ndarray], tuple[Values, Exception | None]], numbers: np.ndarray
+) -> tuple[Values, dict[int, str]]:
     """Values of all samples that do not raise.
 
     Every try takes as long as a whole chunk. One sample that raises is found by looking at one half alone each time;
     only if there are more, both halves are gone into.
     """
-    values, error = _tried(at, numbers)
+    values, error = tried(numbers)
     if error is None:
         return values, {}
     if len(numbers) == 1:
         return {}, {int(numbers[0]): _told(error)}
-    suspects, told = numbers, error
+    suspects = numbers
     while len(suspects) > 1:
         half = len(suspects) // 2
-        _, error = _tried(at, suspects[:half])
-        suspects, told = (suspects[half:], told) if error is None else (suspects[:half], error)
-    rest = numbers[numbers != suspects[0]]
-    values, error = _tried(at, rest)
+        _, error = tried(suspects[:half])
+        suspects = suspects[half:] if error is None else suspects[:half]
+    _, guilty = tried(suspects)  # the error may have passed
+    rest = numbers if guilty is None else numbers[numbers != suspects[0]]
+    values, error = tried(rest)
     if error is None:
-        return values, {int(suspects[0]): _told(told)}
+        return values, {} if guilty is None else {int(suspects[0]): _told(guilty)}
     half = len(numbers) // 2
-    (first, a), (second, b) = _isolated(at, numbers[:half]), _isolated(at, numbers[half:])
+    (first, a), (second, b) = _isolated(tried, numbers[:half]), _isolated(tried, numbers[half:])
     if not first or not second:
         return first or second, a | b
     return {name: np.concatenate([first[name], second[name]]) for name in first}, a | b
 
 
-def _tried(at: Callable[[np.ndarray], Values], numbers: np.ndarray) -> tuple[Values, RuntimeError | None]:
+def _tried(
+    at: Callable[[np.ndarray], Values], kind: type[Exception], numbers: np.ndarray
+) -> tuple[Values, Exception | None]:
     """Values of some samples, or the error that one of them raised."""
     try:
         return at(numbers), None
-    except RuntimeError as error:
+    except InputError:
+        raise
+    except kind as error:
         # Of the device, not of a sample: too little memory is none of its doings.
         if "RESOURCE_EXHAUSTED" in str(error):
             raise InputError(
@@ -175,8 +184,11 @@ def _flat(result: Any) -> dict[str, Any]:
     found = {}
     for key, part in parts:
         for path, leaf in jax.tree_util.tree_leaves_with_path(part):
-            name = [] if key is None else [str(key)]
-            found[".".join([*name, *filter(None, [leaf_name(path)])]) or BARE] = leaf
+            outer = [] if key is None else [str(key)]
+            name = ".".join([*outer, *filter(None, [leaf_name(path)])]) or BARE
+            if name in found:
+                raise InputError(f"The function returns two outputs called {name!r}. Name each differently.")
+            found[name] = leaf
     if not found:
         raise InputError("The function returned nothing. Return a number, an array, or several by name.")
     return found

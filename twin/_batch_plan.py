@@ -12,6 +12,7 @@ from jax.extend.core import ClosedJaxpr
 from twin._checks import InputError
 from twin._cores import usable_cores
 from twin._lapack import LAPACK, equations_of, traced
+from twin._tree_names import leaf_name
 
 WIDEST = 256
 """Samples computed at once on a processor: wider chunks wait longer for their slowest sample and leave the cache."""
@@ -73,9 +74,14 @@ def as_samples(samples: Any) -> tuple[Any, int]:
     """
     if hasattr(samples, "columns") and hasattr(samples, "to_numpy"):
         samples = {str(name): samples[name].to_numpy() for name in samples.columns}
-    lengths = {}
+    elif isinstance(samples, list):
+        samples = np.asarray(samples)
+    lengths, names = {}, set()
     for path, leaf in jax.tree_util.tree_leaves_with_path(samples):
         name = f"samples{jax.tree_util.keystr(path)}"
+        if leaf_name(path) in names:
+            raise InputError(f"Two arrays of the samples are called {leaf_name(path)!r}. Name each differently.")
+        names.add(leaf_name(path))
         array = np.asarray(leaf)
         if array.dtype.kind not in "fiubc":
             raise InputError(f"{name} holds {array.dtype} values, but numbers were expected.")
@@ -87,7 +93,13 @@ def as_samples(samples: Any) -> tuple[Any, int]:
     if len(set(lengths.values())) > 1:
         seen = ", ".join(f"{name} has {length}" for name, length in lengths.items())
         raise InputError(f"The samples are of unequal length: {seen}. Give each sample a row in every array.")
-    return jax.tree.map(np.asarray, samples), next(iter(lengths.values()))
+    return jax.tree.map(_in_double, samples), next(iter(lengths.values()))
+
+
+def _in_double(leaf: Any) -> np.ndarray:
+    """Numbers as they are computed with: those with a fraction in double precision."""
+    array = np.asarray(leaf)
+    return array.astype({"f": np.float64, "c": np.complex128}.get(array.dtype.kind, array.dtype), copy=False)
 
 
 def whole_rows(samples: Any, count: int) -> np.ndarray:

@@ -87,8 +87,14 @@ def _collect(pending: "dict[Future[Any], int]", keep: Keep, patience: float) -> 
 
 def window_of(executor: Executor) -> int:
     """Chunks to hand to an executor ahead of time."""
-    workers = getattr(executor, "_max_workers", None)
-    return 2 * workers if isinstance(workers, int) and workers > 0 else _AHEAD
+    client = getattr(executor, "_client", None)  # of dask
+    if client is not None and callable(getattr(client, "nthreads", None)):
+        return 2 * max(1, sum(client.nthreads().values()))
+    for name in ("_max_workers", "num_workers"):  # of the standard library, of mpi4py
+        workers = getattr(executor, name, None)
+        if isinstance(workers, int) and workers > 0:
+            return 2 * workers
+    return _AHEAD
 
 
 @contextlib.contextmanager

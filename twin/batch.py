@@ -19,6 +19,7 @@ Workers must have the same versions, and be able to import the module that the f
 
 import contextlib
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from functools import partial
@@ -47,7 +48,7 @@ from twin._batch_plan import (
 from twin._batch_run import ExecutorDied, local_threads, run_chunks, window_of
 from twin._batch_worker import compute_here, compute_remotely, packed_job
 from twin._checks import InputError, require_x64
-from twin.batch_result import NOT_FINITE, RAISED, BatchResult, statuses
+from twin.batch_result import DONE, NOT_FINITE, BatchResult, statuses
 from twin.store import StoredChunk
 
 _HOPELESS = 20
@@ -88,7 +89,8 @@ def batched(
             goes on where it was.
         executor: anything like `concurrent.futures.Executor`: `twin.executors.local_processes()`,
             `dask.distributed.Client(...).get_executor()`, `mpi4py.futures.MPIPoolExecutor()`. None: threads of this
-            process, one for each core or accelerator.
+            process, one for each core or accelerator, which take over nothing of JAX's settings for a while
+            (`jax.debug_nans` and the like). Give workers of dask one thread each where `fn` calls LAPACK.
         progress: show a bar with rate and remaining time, if it takes longer than a second.
         difficulty: expected effort for each sample, in any unit: samples of like effort share a chunk, the hardest
             first, so that quick ones do not wait for slow ones.
@@ -113,7 +115,7 @@ def batched(
     samples, count = as_samples(samples)
     fn, retry = _as_tree(fn), None if retry is None else _as_tree(retry)
     order, good = ordered(difficulty, count), whole_rows(samples, count)
-    known = traits(of_one, fn, jax.tree.map(lambda leaf: leaf[np.argmax(good)], samples)) if mode == VMAP else None
+    known = _known(fn, jax.tree.map(lambda leaf: leaf[np.argmax(good)], samples)) if mode == VMAP else None
     asked = None if chunk_size == "auto" else int(chunk_size)
     width = min(asked, count) if asked else automatic_width(count, known)
     with contextlib.ExitStack() as stack:
@@ -129,13 +131,26 @@ def batched(
         return kept.result()
 
 
+def _known(fn: Callable[..., Any], row: Any) -> Traits:
+    try:
+        return traits(of_one, fn, row)
+    except jax.errors.ConcretizationTypeError as error:
+        error.add_note(
+            'The function asks for values while it is compiled: use jnp.where, or batched(..., mode="loop").'
+        )
+        raise
+
+
 def _kept(
     store: str | Path | None, facts: Callable[[], Any], samples: Any, count: int, width: int, asked: int | None
 ) -> AbstractKept:
     if store is None:
         return InMemory(samples, count, width)
     with _interruptions_explained(None):
-        return OnDisk(Path(store), samples, count, width, facts(), asked=asked and width)
+        kept = OnDisk(Path(store).expanduser(), samples, count, width, facts(), asked=None)
+    if asked and kept.width != width:
+        warnings.warn(f"The study goes on in chunks of {kept.width} samples, as it was begun.", stacklevel=4)
+    return kept
 
 
 def _check(fn: Any, chunk_size: Any, executor: Any, mode: str, retry: Any) -> None:
@@ -144,7 +159,9 @@ def _check(fn: Any, chunk_size: Any, executor: Any, mode: str, retry: Any) -> No
             raise InputError(f"{name} must be a function of one sample, but is {type(function).__name__}.")
     if mode not in MODES:
         raise InputError(f"mode must be one of {', '.join(map(repr, MODES))}, but is {mode!r}.")
-    if chunk_size != "auto" and (isinstance(chunk_size, str | float | bool) or int(chunk_size) < 1):
+    if chunk_size != "auto" and (
+        isinstance(chunk_size, bool) or not isinstance(chunk_size, int | np.integer) or chunk_size < 1
+    ):
         raise InputError(f"chunk_size must be 'auto' or a whole number of at least 1, but is {chunk_size!r}.")
     if executor is not None and hasattr(executor, "get_executor"):
         raise InputError("executor is a client of dask; give its client.get_executor().")
@@ -176,7 +193,7 @@ def _run(
     left = [chunk for chunk in range(plan.chunks) if chunk not in done]
     if not left:
         return
-    hopeless = _Hopeless()
+    doubts = _Doubts()
     with contextlib.ExitStack() as stack:
         total = len(plan.order)
         bar = stack.enter_context(_bar(total, total - sum(len(plan.members(c)) for c in left), progress))
@@ -197,27 +214,40 @@ def _run(
             members = plan.members(chunk)
             status = statuses(done.values, good[members], done.raised)
             messages = {int(members[row]): text for row, text in done.raised.items()}
-            kept.write(offset + chunk, StoredChunk(members, status, done.seconds, done.values, messages))
+            content = StoredChunk(members, status, done.seconds, done.values, messages)
+            for number, ready in doubts.cleared(offset + chunk, content):
+                kept.write(number, ready)
             bar.update(len(members))
-            hopeless.look(status, messages)
 
         run_chunks(left, submit, keep, window=window, first_alone=executor is None)
+        for number, ready in doubts.held:
+            kept.write(number, ready)
 
 
-class _Hopeless:
-    """Gives a batch up in which every sample raises, as its function is wrong and not its samples."""
+class _Doubts:
+    """Holds chunks back as long as every sample raises: then the function may be wrong, and not its samples."""
 
     def __init__(self) -> None:
-        self._raised = 0
+        self.held: list[tuple[int, StoredChunk]] = []
+        self._some_done = False
 
-    def look(self, status: np.ndarray, messages: dict[int, str]) -> None:
-        """Look at a chunk."""
-        raised = int(np.count_nonzero(status == RAISED))
-        self._raised = self._raised + raised if raised == len(status) and self._raised >= 0 else -1
-        if self._raised >= _HOPELESS:
+    def cleared(self, number: int, content: StoredChunk) -> list[tuple[int, StoredChunk]]:
+        """Chunks that can be kept, when another one has come.
+
+        Raises:
+            InputError: so many samples raised, and none was computed, that the batch is given up.
+        """
+        self.held.append((number, content))
+        self._some_done |= bool(np.isin(content.status, (DONE, NOT_FINITE)).any())
+        if self._some_done:
+            cleared, self.held = self.held, []
+            return cleared
+        messages = [text for _, chunk in self.held for text in chunk.messages.values()]
+        if len(messages) >= _HOPELESS:
             raise InputError(
-                f"None of the first {self._raised} samples could be computed. The first said: {messages[min(messages)]}"
+                f"None of the first {len(messages)} samples could be computed. The first said: {messages[0]}"
             )
+        return []
 
 
 def _bar(total: int, done: int, progress: bool) -> Any:
@@ -245,6 +275,9 @@ def _interruptions_explained(kept: AbstractKept | None) -> Iterator[None]:
     except (ExecutorDied, StoreFailed) as error:
         dead = isinstance(error, ExecutorDied)
         what = "The executor died" if dead else "The store cannot be read or written"
-        cure = " Give it a new executor." if dead else ""
+        cure = ' Give it a new executor, made in a script below if __name__ == "__main__":.' if dead else ""
         told = kept.told() if kept else "Nothing was computed."
         raise StudyInterrupted(f"{what} ({error}). {told}{cure}") from error
+    except KeyboardInterrupt as error:
+        error.add_note(kept.told() if kept else "Nothing was computed.")
+        raise

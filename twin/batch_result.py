@@ -104,7 +104,7 @@ class BatchResult:
         for name, values in self.outputs.items():
             good = values[self.success]
             row = [name, str(values.shape[1:] or "number")]
-            numbers = good.size > 0 and good.dtype.kind in "fiub"
+            numbers = good.size > 0 and good.dtype.kind in "fiu"
             rows.append([*row, *([good.min(), np.median(good), good.max()] if numbers else [np.nan] * 3)])
         return pd.DataFrame(rows, columns=["output", "shape", "least", "median", "greatest"]).set_index("output")
 

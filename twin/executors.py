@@ -15,7 +15,8 @@ from twin._loop_option import make_small_loops_one_function
 def local_processes(workers: int | None = None) -> ProcessPoolExecutor:
     """Worker processes, started anew, each held on a core of its own.
 
-    In a script, make them below `if __name__ == "__main__":`, as every worker reads the script.
+    In a script, make them below `if __name__ == "__main__":`, as every worker reads the script. Cores are given from
+    the first one on: two pools that run at a time share them.
 
     Args:
         workers: number of processes; that of the cores if not given.
@@ -24,8 +25,13 @@ def local_processes(workers: int | None = None) -> ProcessPoolExecutor:
         The pool; use it in a `with` statement, or shut it down.
 
     Raises:
-        InputError: fewer than one.
+        InputError: fewer than one; called by a worker that reads the script.
     """
+    if multiprocessing.parent_process() is not None:
+        raise InputError(
+            "Workers are made while a worker reads the script. Put what makes them, and what uses them, below "
+            'if __name__ == "__main__":.'
+        )
     cores = usable_cores()
     count = len(cores) if workers is None else workers
     if count < 1:

@@ -1,6 +1,6 @@
 """Reading a study from its folder, also while it runs."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import ItemsView, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -82,11 +82,11 @@ def study_status(folder: str | Path) -> StudyStatus:
         InputError: no study there, or its manifest is damaged.
     """
     store = Store.open(folder)
-    gathered = gathered_from(store, only=())
     size = int(store.manifest["chunks"]["size"])
     first = chunk_count(store.count, size)
     tried = gathered_from(store, only=(), chunks=first)
     again = int(np.count_nonzero(tried.status == NOT_FINITE)) if store.manifest["retry"] else 0
+    gathered = gathered_from(store, only=()) if again else tried
     number = np.bincount(gathered.status, minlength=len(STATUS))
     return StudyStatus(
         store.folder,
@@ -134,6 +134,7 @@ class Gathered:
         """
         self.require_alike(content)
         numbers = content.numbers
+        computed = np.isin(content.status, (DONE, NOT_FINITE))
         self.chunks += 1
         self.status[numbers] = content.status
         # A sample tried again took the time of both.
@@ -145,10 +146,15 @@ class Gathered:
             if self._only is None or name in self._only:
                 if name not in self.outputs:
                     self.outputs[name] = blank(len(self.status), values)
+                output = self.outputs[name]
                 # One sample may give 1 where another gives 1.5.
-                kind = np.result_type(self.outputs[name], values)
-                self.outputs[name] = self.outputs[name].astype(kind, copy=False)
-                self.outputs[name][numbers] = values
+                kind = np.result_type(output, values)
+                if kind != output.dtype:
+                    output = output.astype(kind)
+                    output[~np.isin(self.status, (DONE, NOT_FINITE))] = blank(1, output)[0]
+                output[numbers[computed]] = values[computed]
+                output[numbers[~computed]] = blank(1, output)[0]
+                self.outputs[name] = output
 
 
 class StoredOutputs(Mapping[str, np.ndarray]):
@@ -162,6 +168,13 @@ class StoredOutputs(Mapping[str, np.ndarray]):
         if name not in found:
             raise KeyError(name)
         return found[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in list(self)
+
+    def items(self) -> ItemsView[str, np.ndarray]:
+        """All outputs, read in one go."""
+        return gathered_from(self._store).outputs.items()
 
     def __iter__(self) -> Iterator[str]:
         for file in self._store.files().values():

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from twin._batch_kernel import of_one
 from twin._checks import InputError, finite, require_x64
 from twin.batch import batched
 from twin.parameters import Parameter, ParameterSpace
@@ -58,14 +59,19 @@ def sweep(
         The results. A point that fails is NaN there, and marked in the table.
 
     Raises:
-        InputError: 64-bit mode off, an unknown path, no parameters, values that are none, no vector or not finite or
-            out of bounds, lists of unequal length, a present value of zero in a relative sweep, complex results, a
-            unit for a result that there is not, a chunk size below one, a store that holds another sweep.
+        InputError: 64-bit mode off, an unknown path, a path given twice, no parameters, values that are none, no vector
+            or not finite or out of bounds, lists of unequal length, a present value of zero in a relative sweep,
+            complex results, a unit for a result that there is not, a chunk size below one, a store that holds another
+            sweep.
     """
     require_x64()
     if not over:
         raise InputError("A sweep is over one parameter or more, but none was given.")
     parameters = tuple(_parameter(key, space) for key in over)
+    varied = [path for parameter in parameters for path in (parameter.path, *parameter.tied)]
+    twice = [path for path in varied if varied.count(path) > 1]
+    if twice:
+        raise InputError(f"{twice[0]} is swept twice. Give its values once.")
     present = tuple(float(get_leaf(model, parameter.path)) for parameter in parameters)
     values = tuple(_values(p, v, now, relative) for p, v, now in zip(parameters, over.values(), present, strict=True))
     if not grid and len({axis.size for axis in values}) > 1:
@@ -75,20 +81,32 @@ def sweep(
     points = [axis.ravel() for axis in np.meshgrid(*absolute, indexing="ij")] if grid else absolute
     paths = tuple((parameter.path, *parameter.tied) for parameter in parameters)
     functions = dict(outputs) if isinstance(outputs, Mapping) else outputs
+    at = _AtPoint(model, functions, paths)
+    rows = np.stack(points, axis=-1)
+    expected = _expected(at, rows[0])
+    for name in units or {}:
+        if name not in expected:
+            raise InputError(f"units names the result {name!r}, but the results are {', '.join(expected)}.")
     found = batched(
-        _AtPoint(model, functions, paths),
-        np.stack(points, axis=-1),
+        at,
+        rows,
         chunk_size=chunk_size,
         store=store,
         executor=executor,
         progress=progress,
     )
     shape = tuple(axis.size for axis in values) if grid else values[0].shape
-    results = {name: array.reshape(*shape, *array.shape[1:]) for name, array in found.outputs.items()}
-    for name in units or {}:
-        if name not in results:
-            raise InputError(f"units names the result {name!r}, but the results are {', '.join(results)}.")
+    computed = dict(found.outputs.items())
+    # Where no point could be computed there are no results at all.
+    blank = {name: np.full((len(rows), *inner), np.nan) for name, inner in expected.items() if name not in computed}
+    results = {name: ({**computed, **blank})[name].reshape(*shape, *inner) for name, inner in expected.items()}
     return Sweep(parameters, values, present, relative, results, dict(units or {}), grid, dict(found.messages))
+
+
+def _expected(at: "_AtPoint", row: np.ndarray) -> dict[str, tuple[int, ...]]:
+    """Names and shapes of the results."""
+    found = eqx.filter_eval_shape(of_one, at, jnp.asarray(row))
+    return {name: value.shape for name, value in zip(found.names, found.values, strict=True)}
 
 
 class _AtPoint(eqx.Module):

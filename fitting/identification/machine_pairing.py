@@ -113,7 +113,7 @@ def in_chunks(
         )
     if found.messages:
         raise InputError(f"The modes of some samples could not be computed. {found.message}")
-    outputs = dict(found.outputs)
+    outputs = dict(found.outputs.items())
     each = len(outputs) // len(places)
     return [tuple(outputs[f"{k}.{i}"] for i in range(each)) for k in range(len(places))]
 

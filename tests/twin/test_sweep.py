@@ -172,6 +172,16 @@ def test_a_long_sweep_goes_on(tmp_path):
         sweep(set_leaves(MODEL, {"damping": 0.2}), over, modes, store=tmp_path / "study")
 
 
+def test_points_that_all_raise_are_counted():
+    def refused(model):
+        return {"k": eqx.error_if(model.stiffness, model.stiffness > 0, "no")}
+
+    found = sweep(MODEL, {"stiffness": [300.0, 500.0]}, refused, units={"k": "N m/rad"})
+    assert found.failed.tolist() == [True, True]
+    assert "2 of 2 points" in repr(found)
+    assert list(found.to_dataframe()["remark"]) == ["EquinoxRuntimeError: no"] * 2
+
+
 def test_elements_of_a_vector():
     class Chain(eqx.Module):
         stiffness: Float[Array, "_"]
@@ -196,6 +206,7 @@ def test_points_that_fail_are_marked_and_harm_no_other():
         (modes, {}, {}, "one parameter or more"),
         (modes, {"stiffness": [1.0, 2.0], "damping": [1.0]}, {"grid": False}, "stiffness has 2, damping has 1"),
         (modes, {"stiffness": []}, {}, "at least one"),
+        (modes, {"stiffness": [1.0], Parameter("damping", tied=("stiffness",)): [1.0]}, {}, "swept twice"),
         (modes, {"stiffness": [[1.0]]}, {}, "vector"),
         (modes, {"stiffness": [1.0, np.nan]}, {}, "finite"),
         (modes, {STIFFNESS: [50.0]}, {}, "outside of its bounds"),

@@ -188,7 +188,6 @@ def _weighted(x, weight):
         ({"samples": {**SAMPLES, "c": np.ones(4)}}, "names or values of the samples"),
         ({"difficulty": np.arange(4.0)}, "difficulty was changed"),
         ({"seed": 2}, "seed was 1 and is 2 now"),
-        ({"chunk_size": 3}, "chunk_size was 2 and is 3 now"),
         ({"mode": "loop"}, "mode was vmap and is loop now"),
         ({"retry": _weighted}, r"second try was none and is .*_weighted now"),
     ],

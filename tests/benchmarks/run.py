@@ -9,6 +9,7 @@ import argparse
 import json
 import sys
 import time
+import traceback
 from pathlib import Path
 
 import jax
@@ -35,10 +36,13 @@ def main() -> None:
     given = parser.parse_args()
     earlier = json.loads(given.compare.read_text(encoding="utf-8")) if given.compare else None
     options = sections.Options(given.out, given.rounds, given.ticks, given.starts, given.short, earlier)
-    print(run_all(given.sections, options))
+    text, left_out = run_all(given.sections, options)
+    print(text)
+    if left_out:
+        raise SystemExit(f"left out, as they failed: {', '.join(left_out)}")
 
 
-def run_all(names: list[str], options: sections.Options) -> str:
+def run_all(names: list[str], options: sections.Options) -> tuple[str, list[str]]:
     """Run sections one after the other; what is there so far is written after each.
 
     Args:
@@ -46,17 +50,22 @@ def run_all(names: list[str], options: sections.Options) -> str:
         options: what was asked for.
 
     Returns:
-        The report.
+        The report, and the sections that are not in it, as they failed.
     """
     options.out.mkdir(parents=True, exist_ok=True)
-    about, found, seconds, text = machine(), {}, {}, ""
+    about, found, seconds, text, left_out = machine(), {}, {}, "", []
     for name in names:
         begin = time.perf_counter()
-        found[name] = sections.run(name, options)
+        try:
+            found[name] = sections.run(name, options)
+        except Exception:  # a peer that is missing must not cost the other sections
+            traceback.print_exc()
+            left_out.append(name)
+            continue
         seconds[name] = round(time.perf_counter() - begin, 1)
         print(f"{name}: {seconds[name]:.0f} s", file=sys.stderr, flush=True)
         text = write(options.out, found, {**about, "seconds": seconds})
-    return text
+    return text, left_out
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from twin._fingerprint_packages import is_own, module_of_compiled, package_of
@@ -50,9 +51,7 @@ class Walk:
             value: anything.
         """
         if isinstance(value, np.ndarray | np.generic | jax.Array):
-            array = np.asarray(value)
-            self._tell(where, "array", array.dtype.str, str(array.shape))
-            self._sums[where].update(np.ascontiguousarray(array).tobytes())
+            self._array(where, value)
         elif isinstance(value, _PLAIN):
             self._tell(where, type(value).__name__, repr(value))
         elif isinstance(value, types.ModuleType):
@@ -70,6 +69,17 @@ class Walk:
             self._open.append(id(value))
             self._structure(where, value)
             self._open.pop()
+
+    def _array(self, where: str, value: Any) -> None:
+        if isinstance(value, jax.Array) and jnp.issubdtype(value.dtype, jax.dtypes.prng_key):
+            self._tell(where, f"key {jax.random.key_impl(value)}")
+            value = jax.random.key_data(value)
+        array = np.asarray(value)
+        self._tell(where, "array", array.dtype.str, str(array.shape))
+        if array.dtype.hasobject:
+            self.add(where, array.tolist())  # its bytes are addresses
+        else:
+            self._sums[where].update(np.ascontiguousarray(array).tobytes())
 
     def _structure(self, where: str, value: Any) -> None:
         if isinstance(value, functools.partial | functools.partialmethod):

@@ -155,16 +155,20 @@ elementwise = np.vectorize(lambda x: 132 * x)
 bound = functools.partial(jax.jit(lambda k, x: k * x), 133)
 
 
+drawn = jax.random.key(134)
+things = np.array([Marker(135), "text"], dtype=object)
+
+
 def rules(x):
     used = (smooth, several, backward, filtered_rule, batch_rule)
-    made = (slope, rows, filtered_rows, filtered_slope, again, jacobian, elementwise, bound)
+    made = (slope, rows, filtered_rows, filtered_slope, again, jacobian, elementwise, bound, drawn, things)
     return x["a"] + 0 * len(used) + 0 * len(made)
 
 
 def model():
     return Model()
 '''
-IN_CLASS, IN_ALL = range(101, 119), range(101, 134)
+IN_CLASS, IN_ALL = range(101, 119), range(101, 136)
 NAME = "changing_code_source"
 
 

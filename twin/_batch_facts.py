@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from twin._checks import InputError
-from twin._fingerprint import function_name, function_parts, samples_digest, versions
+from twin._fingerprint import function_facts, function_name, platform, samples_digest, versions
 from twin.store import Store
 
 _NAMED = 3
@@ -23,14 +23,21 @@ def facts_of(
     mode: str,
 ) -> dict[str, Any]:
     """What a study depends on, for its manifest."""
+    parts, packages = function_facts(fn)
+    second = None
+    if retry is not None:
+        retry_parts, more = function_facts(retry)
+        second = {"name": function_name(retry), "parts": retry_parts}
+        packages |= more
     return {
-        "function": {"name": function_name(fn), "mode": mode, "parts": function_parts(fn)},
-        "retry": None if retry is None else {"name": function_name(retry), "parts": function_parts(retry)},
+        "function": {"name": function_name(fn), "mode": mode, "parts": parts},
+        "retry": second,
         "samples": {"count": count, "digest": samples_digest(samples)},
         "order": samples_digest(order),
         "seed": None if seed is None else int(seed),
         "dtype": "float64",
-        "versions": versions(),
+        "platform": platform(),
+        "versions": {**versions(), **packages},
     }
 
 
@@ -66,12 +73,12 @@ def _changes(old: dict[str, Any], new: dict[str, Any]) -> Iterator[str]:
         yield "the names or values of the samples were changed"
     elif old["order"] != new["order"]:
         yield "difficulty was changed, and with it the order of the samples"
-    for key in ("seed", "dtype"):
+    for key, what in (("seed", "seed"), ("dtype", "dtype"), ("platform", "the platform")):
         if old[key] != new[key]:
-            yield f"{key} was {old[key]} and is {new[key]} now"
+            yield f"{what} was {old[key]} and is {new[key]} now"
     for name, version in new["versions"].items():
         if old["versions"].get(name) != version:
-            yield f"{name} was {old['versions'].get(name)} and is {version} now"
+            yield f"{name} was {old['versions'].get(name, 'not used')} and is {version} now"
 
 
 def _changes_of_function(what: str, was: dict[str, Any], now: dict[str, Any]) -> Iterator[str]:

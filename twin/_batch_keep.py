@@ -124,7 +124,8 @@ class OnDisk(AbstractKept):
         self.width = int(self._store.manifest["chunks"]["size"])
         if damaged:
             warned.append(
-                f"{len(damaged)} chunks were damaged (the first is chunk {damaged[0]}) and are computed again"
+                f"{len(damaged)} chunks were damaged or of another study (the first is chunk {damaged[0]}) and are "
+                "computed again"
             )
         for text in warned:
             warnings.warn(f"{folder}: {text}. If it happens again, look at the disk.", stacklevel=4)

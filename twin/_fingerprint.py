@@ -8,27 +8,37 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from twin._fingerprint_walk import OWN_PACKAGES, Walk
+import jax
 
-_VERSIONED = ("jax", "jaxlib", "numpy", "equinox", "diffrax", "optimistix")
+from twin._fingerprint_packages import OWN_PACKAGES, VERSIONED, package_of, package_versions
+from twin._fingerprint_walk import Walk
 
 
 def function_name(fn: Callable[..., Any]) -> str:
     """Module and name of a function, of a module's class, or of what a partial function calls."""
-    fn = _inner(fn)
-    owner = fn if hasattr(fn, "__qualname__") else type(fn)
+    owner = _owner(fn)
     return f"{owner.__module__}.{owner.__qualname__}"
 
 
 def function_parts(fn: Callable[..., Any]) -> dict[str, str]:
-    """Digests of all that a function consists of, by words for a message: its code and that of what it calls, what it
-    is closed over, the globals that it uses, the fields of a module.
+    """The digests of `function_facts`."""
+    return function_facts(fn)[0]
 
-    Comments do not count. Functions of installed packages count by their name, as their versions are compared.
+
+def function_facts(fn: Callable[..., Any]) -> tuple[dict[str, str], dict[str, str]]:
+    """What a function consists of, and the versions of the packages that it uses.
+
+    Returns:
+        Digests of all that it consists of, by words for a message: its code and that of what it calls, what it is
+        closed over, the globals that it uses, the fields of a module. Comments do not count, nor fields of a dataclass
+        whose metadata say `"changes_results": False`. Functions of installed packages count by their name, but for
+        those of the module that the function itself is in.
+        Versions of those packages by the name of their distribution.
     """
-    walk = Walk()
+    module = _owner(fn).__module__
+    walk = Walk(module if module and package_of(module) else None)
     walk.add("the function itself", fn)
-    return walk.digests()
+    return walk.digests(), package_versions(walk.packages)
 
 
 def samples_digest(samples: Any) -> str:
@@ -41,7 +51,7 @@ def samples_digest(samples: Any) -> str:
 @functools.cache
 def versions() -> dict[str, str]:
     """Versions of what computes, and a digest of the sources of drivetwin itself."""
-    found = {name: importlib.metadata.version(name) for name in _VERSIONED}
+    found = {name: importlib.metadata.version(name) for name in VERSIONED}
     found["python"] = ".".join(map(str, sys.version_info[:2]))
     sources = hashlib.sha256()
     for package in OWN_PACKAGES:
@@ -54,6 +64,16 @@ def versions() -> dict[str, str]:
         own = "not installed"
     found["drivetwin"] = f"{own} (sources {sources.hexdigest()[:12]})"
     return found
+
+
+def platform() -> str:
+    """Kind of device that computes."""
+    return jax.default_backend()
+
+
+def _owner(fn: Any) -> Any:
+    fn = _inner(fn)
+    return fn if hasattr(fn, "__qualname__") else type(fn)
 
 
 def _inner(fn: Any) -> Any:

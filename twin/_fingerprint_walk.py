@@ -2,17 +2,20 @@
 
 import functools
 import hashlib
-import sys
 import types
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
-OWN_PACKAGES = ("twin", "sensitivity", "fitting")
-_INSTALLED = ("site-packages", "dist-packages")
+from twin._fingerprint_packages import is_own, module_of_compiled, package_of
+
+_RULES = ("jvp", "fwd", "bwd", "vmap_rule")
+"""Attributes in which JAX keeps the rules of functions with a derivative of their own."""
+_CHECKERS = ("jaxtyping", "beartype", "typeguard")
+"""Packages whose wrappers change no result, and hold names that are made up anew in each process."""
 _PLAIN = bool | int | float | complex | str | bytes | types.NoneType
 
 
@@ -22,7 +25,15 @@ class Walk:
     Code counts as it was compiled, so that comments do not, nor edits of a file that is not loaded again.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, given: str | None = None) -> None:
+        """Begin.
+
+        Args:
+            given: module whose code counts wherever it lies.
+        """
+        self.packages: set[str] = set()
+        """Installed packages that were met, by the names under which they are imported."""
+        self._given = given
         self._sums: dict[str, Any] = {}
         self._visited: set[Any] = set()
         self._open: list[int] = []
@@ -40,17 +51,16 @@ class Walk:
             value: anything.
         """
         if isinstance(value, np.ndarray | np.generic | jax.Array):
-            array = np.asarray(value)
-            self._tell(where, "array", array.dtype.str, str(array.shape))
-            self._sums[where].update(np.ascontiguousarray(array).tobytes())
+            self._array(where, value)
         elif isinstance(value, _PLAIN):
             self._tell(where, type(value).__name__, repr(value))
         elif isinstance(value, types.ModuleType):
+            self._is_own(value.__name__)
             self._tell(where, "module", value.__name__)
         elif isinstance(value, type):
             self._tell(where, "class", f"{value.__module__}.{value.__qualname__}")
             self._class(value)
-        elif isinstance(value, types.FunctionType) and _is_own(value.__globals__.get("__name__")):
+        elif isinstance(value, types.FunctionType) and self._is_own(value.__globals__.get("__name__")):
             self._tell(where, "function", _name(value))
             self._function(value)
         elif id(value) in self._open:
@@ -60,8 +70,19 @@ class Walk:
             self._structure(where, value)
             self._open.pop()
 
+    def _array(self, where: str, value: Any) -> None:
+        if isinstance(value, jax.Array) and jnp.issubdtype(value.dtype, jax.dtypes.prng_key):
+            self._tell(where, f"key {jax.random.key_impl(value)}")
+            value = jax.random.key_data(value)
+        array = np.asarray(value)
+        self._tell(where, "array", array.dtype.str, str(array.shape))
+        if array.dtype.hasobject:
+            self.add(where, array.tolist())  # its bytes are addresses
+        else:
+            self._sums[where].update(np.ascontiguousarray(array).tobytes())
+
     def _structure(self, where: str, value: Any) -> None:
-        if isinstance(value, functools.partial):
+        if isinstance(value, functools.partial | functools.partialmethod):
             self.add(where, value.func)
             named = {**{str(i): v for i, v in enumerate(value.args)}, **value.keywords}
             self._items("argument ", named)
@@ -69,25 +90,52 @@ class Walk:
             self._several(where, f"{type(value).__qualname__} {len(value)}", value)
         elif isinstance(value, dict):
             # The order of names is no part of the matter: JAX sorts them.
-            items = sorted(value.items(), key=lambda item: repr(item[0]))
+            items = sorted(value.items(), key=lambda item: self._sorting(item[0]))
             self._several(where, f"dict {len(items)}", [part for item in items for part in item])
         elif isinstance(value, set | frozenset):
-            self._several(where, "set", sorted(value, key=repr))
+            self._several(where, "set", sorted(value, key=self._sorting))
+        elif hasattr(value, "__wrapped__") and hasattr(value, "lower"):  # compiled, by JAX or equinox
+            self._several(where, "compiled", (value.__wrapped__,))
         elif hasattr(value, "__dataclass_fields__"):
             self.add(where, type(value))
             inside = f"{where}." if where.startswith("field ") else "field "
-            self._items(inside, {name: getattr(value, name, None) for name in value.__dataclass_fields__})
+            fields = value.__dataclass_fields__.items()
+            counting = [name for name, field in fields if field.metadata.get("changes_results") is not False]
+            self._items(inside, {name: getattr(value, name, None) for name in counting})
         elif isinstance(value, types.MethodType):
             self._several(where, "method", (value.__self__, value.__func__))
+        elif isinstance(value, property):
+            self._several(where, "property", (value.fget, value.fset))
+        elif isinstance(value, functools.cached_property):
+            self._several(where, "property", (value.func,))
+        elif isinstance(value, types.FunctionType):
+            self._installed(where, value)
         elif hasattr(value, "__wrapped__"):
-            self._several(where, "wrapped", (value.__wrapped__,))
-        elif isinstance(value, types.FunctionType | types.BuiltinFunctionType):
-            self._tell(where, "installed", _name(value))
+            rules = [getattr(value, rule) for rule in _RULES if hasattr(value, rule)]
+            self._several(where, "wrapped", (value.__wrapped__, *rules))
+        elif isinstance(value, types.BuiltinFunctionType | np.ufunc):
+            module = getattr(value, "__module__", None) or module_of_compiled(value.__name__, value)
+            self._is_own(module)
+            self._tell(where, "installed", f"{module}.{getattr(value, '__qualname__', value.__name__)}")
+            owner = getattr(value, "__self__", None)
+            if owner is not None and not isinstance(owner, types.ModuleType):
+                self.add(where, owner)
         else:
             self._object(where, value)
 
+    def _installed(self, where: str, function: types.FunctionType) -> None:
+        """A function of a package, which counts by its name, with what it was made from."""
+        self._tell(where, "installed", _name(function))
+        self.add(where, getattr(function, "__wrapped__", None))
+        if str(function.__globals__.get("__name__")).split(".")[0] in _CHECKERS:
+            return
+        for cell in function.__closure__ or ():
+            if cell != types.CellType() and not _is_inside_jax(cell.cell_contents):
+                self.add(where, cell.cell_contents)
+
     def _object(self, where: str, value: Any) -> None:
         """Any other object, by what it would be copied from."""
+        self._is_own(type(value).__module__)
         self._tell(where, "object", f"{type(value).__module__}.{type(value).__qualname__}")
         try:
             parts = value.__reduce_ex__(2)
@@ -110,13 +158,12 @@ class Walk:
 
     def _class(self, cls: type) -> None:
         for owner in cls.__mro__:
-            if not _is_own(owner.__module__) or self._was_here(owner):
+            if not self._is_own(owner.__module__) or self._was_here(owner):
                 continue
+            fields = vars(owner).get("__dataclass_fields__", {})
             for name, value in sorted(vars(owner).items()):
-                inner = getattr(value, "fget", getattr(value, "__func__", value))
-                if isinstance(inner, types.FunctionType) and _is_own(inner.__globals__.get("__name__")):
-                    self._function(inner)
-                elif isinstance(value, _PLAIN | np.ndarray | jax.Array) and not name.startswith("__"):
+                counts = name not in fields or fields[name].metadata.get("changes_results") is not False
+                if counts and (not name.startswith("__") or _is_method(name, value)):
                     self.add(f"{name} of the class {_name(owner)}", value)
 
     def _function(self, function: types.FunctionType) -> None:
@@ -133,11 +180,28 @@ class Walk:
     def _globals(self, module: str, found: dict[str, Any], names: set[str]) -> None:
         for name in sorted(names & found.keys()):
             value = found[name]
-            if isinstance(value, types.ModuleType) and _is_own(value.__name__):
+            if isinstance(value, types.ModuleType) and self._is_own(value.__name__):
                 if not self._was_here(value, frozenset(names)):
                     self._globals(value.__name__, vars(value), names)
             elif not self._was_here(module, name):
                 self.add(f"{name} of {module}", value)
+
+    def _sorting(self, value: Any) -> str:
+        """What a member of a set is sorted by: not its address, nor where its hash puts it."""
+        if isinstance(value, _PLAIN):
+            return repr(value)
+        alone = Walk(self._given)
+        alone._open = [*self._open]
+        alone.add("member", value)
+        return repr(sorted(alone.digests().items()))
+
+    def _is_own(self, module: str | None) -> bool:
+        """Whether code counts as it is; the package of any other is noted."""
+        own = module == self._given or is_own(module)
+        package = None if module is None or is_own(module) else package_of(module)
+        if package is not None:
+            self.packages.add(package)
+        return own
 
     def _was_here(self, *what: Any) -> bool:
         key = tuple(one if isinstance(one, str | frozenset) else id(one) for one in what)
@@ -154,14 +218,15 @@ def _name(thing: Any) -> str:
     return f"{thing.__module__}.{thing.__qualname__}"
 
 
-def _is_own(module: str | None) -> bool:
-    """Whether code is the user's own: neither installed, whose versions are compared, nor of drivetwin."""
-    if module is None or module == "__main__":
-        return True
-    if module.split(".")[0] in (*OWN_PACKAGES, *sys.stdlib_module_names):
-        return False
-    file = getattr(sys.modules.get(module), "__file__", None)
-    return file is None or not set(_INSTALLED) & set(Path(file).parts)
+def _is_method(name: str, value: Any) -> bool:
+    """Whether a name of Python's is defined in a class to do something."""
+    return not name.startswith("__annotat") and (callable(value) or isinstance(value, staticmethod | classmethod))
+
+
+def _is_inside_jax(value: Any) -> bool:
+    """Whether a thing belongs to the inner workings of JAX."""
+    known = isinstance(value, jax.Array | functools.partial | types.FunctionType) or hasattr(value, "__wrapped__")
+    return not known and type(value).__module__.split(".")[0] in ("jax", "jaxlib")
 
 
 def _code(code: types.CodeType) -> str:

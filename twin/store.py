@@ -1,36 +1,35 @@
 """A study on disk: a folder with a manifest, the samples and one checksummed file for each chunk.
 
 Every file is written aside and renamed, so that what has its name is whole, whenever the computer stops. The name of a
-chunk holds the digest of its content: a byte that flips later is found when it is read. Nothing is pickled.
+chunk holds the digest of its content: a byte that flips later is found when it is read. It also holds the digest of the
+manifest: a chunk of another study is never read as one of this. Nothing is pickled.
 """
 
 import contextlib
-import errno
 import hashlib
 import io
 import json
 import os
-import time
+import uuid
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 
 from twin._checks import InputError
+from twin._store_lock import held
 from twin._tree_names import leaf_name
 
-_FORMAT = 1
+_FORMAT = 2
 _MANIFEST, _SAMPLES, _CHUNKS, _LOCK, _ASIDE = "manifest.json", "samples.npz", "chunks", "lock", ".partial"
 _VALUE = "value "
 _ABOUT_SAMPLES = ("numbers", "status", "seconds")
 _DAMAGES = (OSError, ValueError, KeyError, TypeError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error)
 """What reading a damaged file raises."""
-_TRIES, _PAUSE = 10, 0.2
-"""A process that was just killed lets its claim go a moment later [-, s]."""
 
 
 class StoredChunk(NamedTuple):
@@ -54,16 +53,23 @@ class Store:
     def __init__(self, folder: Path, manifest: dict[str, Any]) -> None:
         self.folder = folder
         self.manifest = manifest
+        self._study = _checksum(manifest)
 
     @classmethod
     def begin(cls, folder: Path, manifest: dict[str, Any], samples: Any) -> "Store":
         """Write manifest and samples of a new study into a claimed folder.
 
         Raises:
+            InputError: chunks of a study whose manifest is gone are there.
             OSError: it cannot be written.
         """
         (folder / _CHUNKS).mkdir(exist_ok=True)
         store = cls(folder, {"format": _FORMAT, **manifest})
+        if store.files():
+            raise InputError(
+                f"{folder} holds {len(store.files())} chunks of a study, but no {_MANIFEST} that tells of which. Give "
+                "a new or an empty folder as store, or put the manifest back."
+            )
         store.write_samples(samples)
         text = json.dumps({**store.manifest, "checksum": _checksum(store.manifest)}, indent=2)
         _write(folder / _MANIFEST, text.encode())
@@ -142,7 +148,8 @@ class Store:
         """
         values = {f"{_VALUE}{name}": value for name, value in content.values.items()}
         messages = {str(number): text for number, text in content.messages.items()}
-        data = _packed({**{name: getattr(content, name) for name in _ABOUT_SAMPLES}, **values}, messages=messages)
+        arrays = {**{name: getattr(content, name) for name in _ABOUT_SAMPLES}, **values}
+        data = _packed(arrays, study=self._study, messages=messages)
         _write(self.folder / _CHUNKS / f"{chunk:07d}-{_digest(data)}.npz", data)
 
     def remove(self, chunk: int) -> None:
@@ -160,7 +167,7 @@ class Store:
         return found
 
     def read(self, file: Path) -> StoredChunk | None:
-        """The content of a chunk's file; None where it is damaged or gone.
+        """The content of a chunk's file; None where it is damaged or gone, or of another study.
 
         Raises:
             OSError: it cannot be read, which does not say that it is damaged.
@@ -170,6 +177,8 @@ class Store:
             if file.stem.split("-")[1] != _digest(data):
                 return None
             arrays, about = _unpacked(data)
+            if about["study"] != self._study:
+                return None
             values = {n.removeprefix(_VALUE): array for n, array in arrays.items() if n.startswith(_VALUE)}
             messages = {int(number): text for number, text in about["messages"].items()}
             about_samples = {name: arrays[name] for name in _ABOUT_SAMPLES}
@@ -193,27 +202,18 @@ class Store:
 
 @contextlib.contextmanager
 def claim(folder: Path) -> Iterator[None]:
-    """Hold a folder for this process, and make it if it is not there.
+    """Hold a folder for this call, and make it if it is not there.
 
     Raises:
         InputError: a file is in the place of the folder, or the folder holds anything but a study, or another process
-            computes it.
+            or another thread of this one computes it.
         OSError: it cannot be made.
     """
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file. Give a new or an empty folder as store.")
     folder.mkdir(parents=True, exist_ok=True)
     _require_own(folder)
-    with open(folder / _LOCK, "ab") as lock:
-        tries = 1
-        while _held_elsewhere(lock):
-            if tries == _TRIES:
-                raise InputError(
-                    f"The study in {folder} is being computed by another process. Wait for it, or give another folder "
-                    "as store; twin.study.read_study reads what is there."
-                )
-            tries += 1
-            time.sleep(_PAUSE)
+    with held(folder, folder / _LOCK):
         yield
 
 
@@ -223,19 +223,6 @@ def _require_own(folder: Path) -> None:
     others = sorted(f.name for f in folder.iterdir() if f.name not in own and f.suffix != _ASIDE)
     if others and not Store.is_in(folder):
         raise InputError(f"{folder} holds {others[0]!r}, but no study. Give a new or an empty folder as store.")
-
-
-def _held_elsewhere(lock: IO[bytes]) -> bool:
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        return False
-    try:
-        # A lock of the process, not of the file: children that outlive a killed process do not keep it.
-        fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        return error.errno in (errno.EACCES, errno.EAGAIN)  # anything else: a file system without locks
-    return False
 
 
 def _checksum(manifest: dict[str, Any]) -> str:
@@ -262,7 +249,7 @@ def _digest(data: bytes) -> str:
 
 
 def _write(file: Path, data: bytes) -> None:
-    aside = file.with_name(f"{file.name}.{os.getpid()}{_ASIDE}")
+    aside = file.with_name(f"{file.name}.{uuid.uuid4().hex}{_ASIDE}")
     try:
         with open(aside, "wb") as out:
             out.write(data)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from twin._checks import InputError
 from twin.batch import StudyInterrupted, batched
 from twin.batch_result import DONE, WAITING
-from twin.store import Store, StoredChunk, claim
+from twin.store import Store, StoredChunk
 from twin.study import Gathered, read_study, study_status
 
 SAMPLES = np.random.default_rng(3).random((60, 3))
@@ -178,24 +178,6 @@ def test_it_can_be_read_while_it_runs(tmp_path):
     assert seen == sorted(seen, reverse=True)
     assert len(seen) == 3
     assert 60 > seen[0] > seen[-1] > 0
-
-
-def test_one_process_at_a_time(folder, tmp_path):
-    script = tmp_path / "holder.py"
-    script.write_text(
-        "import sys, pathlib\nfrom twin.store import claim\n"
-        "with claim(pathlib.Path(sys.argv[1])):\n    print('held', flush=True)\n    sys.stdin.read()\n"
-    )
-    with functions.started(script, folder) as process:
-        assert process.stdout.readline() == "held\n"
-        with pytest.raises(InputError, match="computed by another process"):
-            study(folder)
-        assert read_study(folder).success.all()
-        process.kill()  # and not closed
-        process.wait()
-        with claim(folder):
-            pass
-    assert study(folder).success.all()
 
 
 def test_nothing_is_pickled(folder):

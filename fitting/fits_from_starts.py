@@ -33,9 +33,9 @@ class FitsFromStarts:
     """Fits that run in step."""
     threads: int | None = dataclasses.field(metadata={"changes_results": False})
     """Sets of lanes that run side by side."""
-    keep: Keep | None = None
+    keep: Keep | None = dataclasses.field(default=None, metadata={"changes_results": False})
     """Whose whole outcome to keep, see `solve_lanes`; not where the fits run in workers."""
-    kept: dict[int, Solved] = dataclasses.field(default_factory=dict)
+    kept: dict[int, Solved] = dataclasses.field(default_factory=dict, metadata={"changes_results": False})
     """Whole outcomes by the number of the start, of the fits that ran in this process."""
 
     def run(self, starts: np.ndarray, *, store: str | Path | None, executor: Executor | None, progress: bool) -> Ended:

@@ -41,21 +41,17 @@ def facts_of(
     }
 
 
-def require_same(store: Store, facts: dict[str, Any], asked: int | None) -> None:
+def require_same(store: Store, facts: dict[str, Any]) -> None:
     """Raise unless the study in a folder is the one that is to go on.
 
     Args:
         store: the study.
         facts: those of the one that is to go on.
-        asked: samples in a chunk, if the caller asked for a number.
 
     Raises:
         InputError: it is another one; the message says what was changed.
     """
     changed = list(_changes(store.manifest, facts))
-    size = store.manifest["chunks"]["size"]
-    if asked not in (None, size):
-        changed.append(f"chunk_size was {size} and is {asked} now")
     if changed:
         raise InputError(
             f"{store.folder} holds another study: {'; '.join(changed)}. "

@@ -97,9 +97,7 @@ class InMemory(AbstractKept):
 class OnDisk(AbstractKept):
     """Chunks in the folder of a study, which it holds until it is closed."""
 
-    def __init__(
-        self, folder: Path, samples: Any, count: int, width: int, facts: dict[str, Any], *, asked: int | None
-    ) -> None:
+    def __init__(self, folder: Path, samples: Any, count: int, width: int, facts: dict[str, Any]) -> None:
         """Begin a study, or find it.
 
         Args:
@@ -108,7 +106,6 @@ class OnDisk(AbstractKept):
             count: how many.
             width: samples in a chunk, if the study is new.
             facts: what the study depends on, see `facts_of`.
-            asked: samples in a chunk, if the caller asked for a number.
 
         Raises:
             InputError: another study is there, or another process computes it.
@@ -118,7 +115,7 @@ class OnDisk(AbstractKept):
         self._gathered = Gathered(count, only=())
         with _disk_explained(), contextlib.ExitStack() as stack:
             stack.enter_context(claim(folder))
-            warned = self._begin(folder, samples, {**facts, "chunks": {"size": width}}, asked)
+            warned = self._begin(folder, samples, {**facts, "chunks": {"size": width}})
             damaged = [number for number, content in self._store.mended() if not self._is_whole(number, content)]
             self._claim = stack.pop_all()
         self.width = int(self._store.manifest["chunks"]["size"])
@@ -130,12 +127,12 @@ class OnDisk(AbstractKept):
         for text in warned:
             warnings.warn(f"{folder}: {text}. If it happens again, look at the disk.", stacklevel=4)
 
-    def _begin(self, folder: Path, samples: Any, manifest: dict[str, Any], asked: int | None) -> list[str]:
+    def _begin(self, folder: Path, samples: Any, manifest: dict[str, Any]) -> list[str]:
         if not Store.is_in(folder):
             self._store = Store.begin(folder, manifest, samples)
             return []
         self._store = Store.open(folder)
-        require_same(self._store, manifest, asked)
+        require_same(self._store, manifest)
         try:
             self._store.samples()
         except InputError:

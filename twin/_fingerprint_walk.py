@@ -1,7 +1,10 @@
 """A walk through all that a function consists of, with a digest for each part that can be named in a message."""
 
+import contextlib
+import dis
 import functools
 import hashlib
+import importlib
 import types
 from collections.abc import Iterable
 from typing import Any
@@ -175,7 +178,9 @@ class Walk:
             if cell != types.CellType():  # an empty one
                 self.add(f"{cell_name}, which {name} is closed over", cell.cell_contents)
         self.add(f"a default of {name}", [function.__defaults__, function.__kwdefaults__])
-        self._globals(str(function.__globals__.get("__name__")), function.__globals__, names)
+        module = str(function.__globals__.get("__name__"))
+        self._globals(module, function.__globals__, names)
+        self._globals(f"what {name} imports", _imported(function.__code__), names)
 
     def _globals(self, module: str, found: dict[str, Any], names: set[str]) -> None:
         for name in sorted(names & found.keys()):
@@ -239,6 +244,16 @@ def _constant(value: Any) -> str:
     if isinstance(value, types.CodeType):
         return _code(value)
     return repr(sorted(value, key=repr) if isinstance(value, frozenset) else value)
+
+
+def _imported(code: types.CodeType) -> dict[str, Any]:
+    """Modules that a function imports when it is called, those that can be."""
+    found = {}
+    for instruction in dis.get_instructions(code):
+        if instruction.opname == "IMPORT_NAME":
+            with contextlib.suppress(ImportError, TypeError):
+                found[instruction.argval] = importlib.import_module(instruction.argval)
+    return found
 
 
 def _names(code: types.CodeType) -> set[str]:

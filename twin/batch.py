@@ -147,7 +147,7 @@ def _kept(
     if store is None:
         return InMemory(samples, count, width)
     with _interruptions_explained(None):
-        kept = OnDisk(Path(store).expanduser(), samples, count, width, facts(), asked=None)
+        kept = OnDisk(Path(store).expanduser(), samples, count, width, facts())
     if asked and kept.width != width:
         warnings.warn(f"The study goes on in chunks of {kept.width} samples, as it was begun.", stacklevel=4)
     return kept

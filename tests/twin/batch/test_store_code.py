@@ -159,3 +159,19 @@ def test_functions_without_code_are_told_apart(one, other):
 
     assert parts(one) == parts(one)
     assert parts(one) != parts(other)
+
+
+def _imports_late(x):
+    import late_constants
+
+    return late_constants.FACTOR * x["a"]
+
+
+def test_what_a_function_imports_when_called_is_seen(folder):
+    (folder / "late_constants.py").write_text("FACTOR = 2.0\n")
+    first = function_parts(_imports_late)
+    assert function_parts(_imports_late) == first
+    (folder / "late_constants.py").write_text("FACTOR = 30.0\n")
+    sys.modules.pop("late_constants")
+    assert function_parts(_imports_late) != first
+    sys.modules.pop("late_constants")

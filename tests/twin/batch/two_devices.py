@@ -16,9 +16,9 @@ def main():
     mapped, seen = _batch_kernel._mapped, []
 
     def watched(fn, rows):
-        values, names = mapped(fn, rows)
-        seen.append([str(device) for value in values for device in value.devices()])
-        return values, names
+        found = mapped(fn, rows)
+        seen.append([str(device) for value in found.values for device in value.devices()])
+        return found
 
     _batch_kernel._mapped = watched
     samples = np.random.default_rng(7).random((64, 3)) * 0.9

@@ -71,7 +71,7 @@ def test_workers_of_other_versions_are_refused(workers, monkeypatch):
 @pytest.mark.slow
 def test_an_error_that_cannot_be_read_leaves_the_workers_alive(workers):
     for _ in range(2):
-        with pytest.raises(InputError, match="None of the first 20.*AwkwardError: wrong units"):
+        with pytest.raises(InputError, match=r"None of the first 20.*AwkwardError: wrong units"):
             quiet(functions.awkward, RNG.random((20, 3)), mode="chunk", executor=workers)
 
 

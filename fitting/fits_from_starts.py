@@ -78,7 +78,7 @@ class FitsFromStarts:
         missing = np.array([i for i in chosen if i not in self.kept], dtype=int)
         if missing.size:
             self.keep = lambda cost, best: True
-            self(self._rows(starts, missing))
+            self({"number": missing, "start": starts[missing]})
         return {i: self.kept[i] for i in chosen}
 
     def __call__(self, rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -108,7 +108,3 @@ class FitsFromStarts:
     def __getstate__(self) -> dict[str, Any]:
         """What a worker needs."""
         return {**self.__dict__, "keep": None, "kept": {}}
-
-    @staticmethod
-    def _rows(starts: np.ndarray, numbers: np.ndarray) -> dict[str, np.ndarray]:
-        return {"number": numbers, "start": starts[numbers]}

@@ -167,15 +167,7 @@ def morris(
     unit = salib.sample(problem, trajectories, num_levels=levels, seed=seed)
     values = from_unit(space, unit)
     found = evaluate(
-        fn,
-        space,
-        values,
-        model=model,
-        chunk=chunk,
-        seed=seed,
-        store=store,
-        executor=executor,
-        progress=progress,
+        fn, space, values, model=model, chunk=chunk, seed=seed, store=store, executor=executor, progress=progress
     )
     matrix, names = named_columns(found, outputs, len(values))
     require_finite(matrix, names, space, values)

@@ -121,11 +121,7 @@ def _field(plant: AbstractPlant, reference: AbstractReference) -> Callable:
 
 
 def _integrate(
-    field: Callable,
-    state: PyTree[Array],
-    times: Array,
-    reference: AbstractReference,
-    stepping: AdaptiveSteps,
+    field: Callable, state: PyTree[Array], times: Array, reference: AbstractReference, stepping: AdaptiveSteps
 ) -> tuple[PyTree[Array], Int[Array, ""]]:
     # What a reference returns is continuous, so a moving switching time adds nothing of its own to a derivative.
     knots = jax.lax.stop_gradient(reference.switching_times())

@@ -7,13 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 
 from twin._batch_facts import require_same
 from twin._batch_plan import Plan
 from twin._checks import InputError
-from twin._tree_names import leaf_name
+from twin._tree_names import named_leaves
 from twin.batch_result import BatchResult
 from twin.store import Store, StoredChunk, claim
 from twin.study import Gathered, read_study
@@ -82,9 +81,8 @@ class InMemory(AbstractKept):
 
     def result(self) -> BatchResult:
         """All that is there."""
-        leaves = {leaf_name(p) or "samples": leaf for p, leaf in jax.tree_util.tree_leaves_with_path(self._samples)}
-        found = self._gathered
-        return BatchResult(found.outputs, found.status, found.seconds, found.messages, leaves)
+        found, samples = self._gathered, named_leaves(self._samples, "samples")
+        return BatchResult(found.outputs, found.status, found.seconds, found.messages, samples)
 
     def told(self) -> str:
         """Nothing is left."""

@@ -12,6 +12,7 @@ import numpy as np
 from twin._batch_plan import rows_of
 from twin._checks import InputError
 from twin._tree_names import leaf_name
+from twin.batch_result import blank
 
 VMAP, LOOP, CHUNK = "vmap", "loop", "chunk"
 MODES = (VMAP, LOOP, CHUNK)
@@ -200,8 +201,7 @@ def _spread(values: Values, numbers: Sequence[Any], count: int) -> Values:
         return values
     spread = {}
     for name, value in values.items():
-        empty = np.nan if value.dtype.kind in "fc" else 0
-        spread[name] = np.full((count, *value.shape[1:]), empty, dtype=value.dtype)
+        spread[name] = blank(count, value)
         spread[name][numbers] = value
     return spread
 

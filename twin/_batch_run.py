@@ -111,8 +111,6 @@ def local_threads(count: int) -> Iterator[ThreadPoolExecutor]:
         devices.put(device)
 
     def begin() -> None:
-        # A thread does not inherit what its starter set for a while.
-        jax.enable_x64(True).__enter__()
         if not devices.empty():
             jax.default_device(devices.get()).__enter__()
 

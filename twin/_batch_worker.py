@@ -21,7 +21,9 @@ class Failed(NamedTuple):
 def compute_here(fn: Any, mode: str, rows: Any, good: np.ndarray, width: int) -> Computed | Failed:
     """Compute a chunk in a thread of this process; arguments as of `twin._batch_kernel.compute`."""
     try:
-        return compute(fn, mode, rows, good, width)
+        # A thread does not inherit what its starter set for a while.
+        with jax.enable_x64(True):
+            return compute(fn, mode, rows, good, width)
     except Exception as error:
         return Failed(error)
 

@@ -34,12 +34,7 @@ def calls_lapack(function: Callable, *arguments: Any) -> bool:
         function: any function that JAX can trace.
         arguments: of the function.
     """
-    return mentions_lapack(traced(function, *arguments))
-
-
-def mentions_lapack(jaxpr: Any) -> bool:
-    """Whether a factorisation by LAPACK is part of a traced program."""
-    return any(equation.primitive.name in LAPACK for equation in equations_of(jaxpr))
+    return any(equation.primitive.name in LAPACK for equation in equations_of(traced(function, *arguments)))
 
 
 def traced(function: Callable, *arguments: Any) -> Any:

@@ -48,7 +48,7 @@ from twin._batch_plan import (
 from twin._batch_run import ExecutorDied, local_threads, run_chunks, window_of
 from twin._batch_worker import compute_here, compute_remotely, packed_job
 from twin._checks import InputError, require_x64
-from twin.batch_result import DONE, NOT_FINITE, BatchResult, statuses
+from twin.batch_result import NOT_FINITE, BatchResult, statuses, was_computed
 from twin.store import StoredChunk
 
 _HOPELESS = 20
@@ -154,8 +154,8 @@ def _kept(
 
 
 def _check(fn: Any, chunk_size: Any, executor: Any, mode: str, retry: Any) -> None:
-    for name, function in (("fn", fn), ("retry", retry)):
-        if not callable(function) and not (name == "retry" and function is None):
+    for name, function in (("fn", fn), ("retry", fn if retry is None else retry)):
+        if not callable(function):
             raise InputError(f"{name} must be a function of one sample, but is {type(function).__name__}.")
     if mode not in MODES:
         raise InputError(f"mode must be one of {', '.join(map(repr, MODES))}, but is {mode!r}.")
@@ -197,14 +197,15 @@ def _run(
     with contextlib.ExitStack() as stack:
         total = len(plan.order)
         bar = stack.enter_context(_bar(total, total - sum(len(plan.members(c)) for c in left), progress))
+        here = executor is None or isinstance(executor, ThreadPoolExecutor)
+        work = partial(compute_here, fn, mode) if here else partial(compute_remotely, packed_job(fn, mode))
         if executor is None:
             threads = streams(known)
-            pool = stack.enter_context(local_threads(threads))
-            start, window = partial(pool.submit, partial(compute_here, fn, mode)), threads + 1
+            executor, window = stack.enter_context(local_threads(threads)), threads + 1
         else:
-            there = partial(compute_remotely, packed_job(fn, mode))
-            alone = known is not None and known.lapack and isinstance(executor, ThreadPoolExecutor)
-            start, window = partial(executor.submit, there), 1 if alone else window_of(executor)
+            alone = here and known is not None and known.lapack
+            window = 1 if alone else window_of(executor)
+        start = partial(executor.submit, work)
 
         def submit(chunk: int) -> "Future[Any]":
             members = plan.members(chunk)
@@ -219,7 +220,7 @@ def _run(
                 kept.write(number, ready)
             bar.update(len(members))
 
-        run_chunks(left, submit, keep, window=window, first_alone=executor is None)
+        run_chunks(left, submit, keep, window=window, first_alone=here)
         for number, ready in doubts.held:
             kept.write(number, ready)
 
@@ -238,7 +239,7 @@ class _Doubts:
             InputError: so many samples raised, and none was computed, that the batch is given up.
         """
         self.held.append((number, content))
-        self._some_done |= bool(np.isin(content.status, (DONE, NOT_FINITE)).any())
+        self._some_done |= bool(was_computed(content.status).any())
         if self._some_done:
             cleared, self.held = self.held, []
             return cleared

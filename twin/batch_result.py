@@ -75,8 +75,7 @@ class BatchResult:
     def digest(self) -> str:
         """Digest of all outputs and of what became of each sample: equal for equal results, to the last bit."""
         sha = hashlib.sha256(np.ascontiguousarray(self.status).tobytes())
-        for name in sorted(self.outputs):
-            values = self.outputs[name]
+        for name, values in sorted(self.outputs.items(), key=lambda item: item[0]):
             sha.update(f"{name} {values.dtype.str} {values.shape}".encode())
             sha.update(np.ascontiguousarray(values).tobytes())
         return sha.hexdigest()
@@ -124,6 +123,11 @@ def statuses(values: Mapping[str, np.ndarray], good: np.ndarray, raised: Mapping
     status[list(raised)] = RAISED
     status[~good] = SAMPLE_IS_NAN
     return status
+
+
+def was_computed(status: np.ndarray) -> np.ndarray:
+    """Which samples have outputs, finite or not."""
+    return np.isin(status, (DONE, NOT_FINITE))
 
 
 def _columns(arrays: Mapping[str, np.ndarray], longest: int = 12) -> dict[str, np.ndarray]:

@@ -9,6 +9,7 @@ from jaxtyping import Array, ArrayLike, Complex, Float, PyTree
 
 from twin._checks import InputError, as_array, as_scalar, require_x64
 from twin._small_systems import solve_many
+from twin._tree_names import leaf_name
 from twin.frf import FRF
 from twin.plant import AbstractPlant
 
@@ -168,6 +169,6 @@ def _indices(kind: str, names: tuple[str, ...], wanted: tuple[str, ...] | None) 
 def _names(tree: PyTree[Array]) -> tuple[str, ...]:
     names = []
     for keys, leaf in jax.tree_util.tree_leaves_with_path(tree):
-        name = ".".join(str(getattr(k, "name", getattr(k, "idx", getattr(k, "key", k)))) for k in keys)
+        name = leaf_name(keys)
         names += [name] if jnp.ndim(leaf) == 0 else [f"{name}.{i}" for i in range(jnp.size(leaf))]
     return tuple(names)

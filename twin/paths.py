@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array
 
 from twin._checks import InputError
+from twin._tree_names import leaf_name
 
 Model = TypeVar("Model")
 
@@ -81,7 +82,7 @@ def leaf_paths(model: Any) -> tuple[str, ...]:
     for keys, leaf in jax.tree_util.tree_leaves_with_path(model):
         if not eqx.is_inexact_array(leaf):
             continue
-        path = ".".join(_key(k) for k in keys)
+        path = leaf_name(keys)
         found += [path] if leaf.ndim == 0 else [f"{path}.{i}" for i in range(leaf.size)] if leaf.ndim == 1 else []
     return tuple(found)
 
@@ -122,7 +123,3 @@ def _walk(model: Any, path: str) -> Any:
 def _listing(model: Any) -> str:
     paths = leaf_paths(model)
     return ", ".join(paths[:40]) + (f", ... ({len(paths)} in all)" if len(paths) > 40 else "")
-
-
-def _key(entry: Any) -> str:
-    return str(getattr(entry, "name", getattr(entry, "idx", getattr(entry, "key", entry))))

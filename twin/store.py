@@ -17,12 +17,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 
 from twin._checks import InputError
 from twin._store_lock import held
-from twin._tree_names import leaf_name
+from twin._tree_names import named_leaves
 
 _FORMAT = 2
 _MANIFEST, _SAMPLES, _CHUNKS, _LOCK, _ASIDE = "manifest.json", "samples.npz", "chunks", "lock", ".partial"
@@ -136,7 +135,7 @@ class Store:
         Raises:
             OSError: no space left, or the folder is gone.
         """
-        leaves = {leaf_name(p) or "samples": leaf for p, leaf in jax.tree_util.tree_leaves_with_path(samples)}
+        leaves = named_leaves(samples, "samples")
         digest = _digest(b"".join(leaf.tobytes() for leaf in leaves.values()))
         _write(self.folder / _SAMPLES, _packed(leaves, digest=digest))
 

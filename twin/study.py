@@ -1,6 +1,6 @@
 """Reading a study from its folder, also while it runs."""
 
-from collections.abc import ItemsView, Iterator, Mapping
+from collections.abc import ItemsView, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from twin._batch_plan import chunk_count, second_width
 from twin._checks import InputError
-from twin.batch_result import DONE, NOT_FINITE, STATUS, WAITING, BatchResult, blank
+from twin.batch_result import DONE, NOT_FINITE, STATUS, WAITING, BatchResult, blank, was_computed
 from twin.store import Store, StoredChunk
 
 
@@ -84,16 +84,20 @@ def study_status(folder: str | Path) -> StudyStatus:
     store = Store.open(folder)
     size = int(store.manifest["chunks"]["size"])
     first = chunk_count(store.count, size)
-    tried = gathered_from(store, only=(), chunks=first)
-    again = int(np.count_nonzero(tried.status == NOT_FINITE)) if store.manifest["retry"] else 0
-    gathered = gathered_from(store, only=()) if again else tried
+    # One look at the folder: a study that runs has more chunks at the next one.
+    chunks = sorted(store.files().items())
+    gathered = Gathered(store.count, only=())
+    gathered.read(store, [file for number, file in chunks if number < first])
+    tried = gathered.chunks
+    again = int(np.count_nonzero(gathered.status == NOT_FINITE)) if store.manifest["retry"] else 0
+    gathered.read(store, [file for number, file in chunks if number >= first])
     number = np.bincount(gathered.status, minlength=len(STATUS))
     return StudyStatus(
         store.folder,
         store.manifest["function"]["name"],
         dict(zip(STATUS, number.tolist(), strict=True)),
-        (tried.chunks, first),
-        (gathered.chunks - tried.chunks, chunk_count(again, second_width(size))),
+        (tried, first),
+        (gathered.chunks - tried, chunk_count(again, second_width(size))),
         gathered.damaged,
         float(gathered.seconds.sum()),
         store.manifest["versions"],
@@ -126,6 +130,15 @@ class Gathered:
                 "Return the same for each."
             )
 
+    def read(self, store: Store, files: Iterable[Path]) -> None:
+        """Add chunks of a store, those that are whole; the others are counted."""
+        for file in files:
+            content = store.read(file)
+            if content is None:
+                self.damaged += 1
+            else:
+                self.add(content)
+
     def add(self, content: StoredChunk) -> None:
         """Put the samples of a chunk in their places.
 
@@ -134,7 +147,7 @@ class Gathered:
         """
         self.require_alike(content)
         numbers = content.numbers
-        computed = np.isin(content.status, (DONE, NOT_FINITE))
+        computed = was_computed(content.status)
         self.chunks += 1
         self.status[numbers] = content.status
         # A sample tried again took the time of both.
@@ -151,7 +164,7 @@ class Gathered:
                 kind = np.result_type(output, values)
                 if kind != output.dtype:
                     output = output.astype(kind)
-                    output[~np.isin(self.status, (DONE, NOT_FINITE))] = blank(1, output)[0]
+                    output[~was_computed(self.status)] = blank(1, output)[0]
                 output[numbers[computed]] = values[computed]
                 output[numbers[~computed]] = blank(1, output)[0]
                 self.outputs[name] = output
@@ -187,21 +200,13 @@ class StoredOutputs(Mapping[str, np.ndarray]):
         return len(list(iter(self)))
 
 
-def gathered_from(store: Store, only: tuple[str, ...] | None = None, chunks: int | None = None) -> Gathered:
+def gathered_from(store: Store, only: tuple[str, ...] | None = None) -> Gathered:
     """All chunks of a store that are whole.
 
     Args:
         store: the store.
         only: names of the outputs wanted; None for all.
-        chunks: number of the first chunks wanted; None for all.
     """
     gathered = Gathered(store.count, only)
-    for number, file in sorted(store.files().items()):
-        if chunks is not None and number >= chunks:
-            break
-        content = store.read(file)
-        if content is None:
-            gathered.damaged += 1
-        else:
-            gathered.add(content)
+    gathered.read(store, [file for _, file in sorted(store.files().items())])
     return gathered

@@ -68,7 +68,8 @@ def sweep(
     if not over:
         raise InputError("A sweep is over one parameter or more, but none was given.")
     parameters = tuple(_parameter(key, space) for key in over)
-    varied = [path for parameter in parameters for path in (parameter.path, *parameter.tied)]
+    paths = tuple((parameter.path, *parameter.tied) for parameter in parameters)
+    varied = [path for tied in paths for path in tied]
     twice = [path for path in varied if varied.count(path) > 1]
     if twice:
         raise InputError(f"{twice[0]} is swept twice. Give its values once.")
@@ -79,7 +80,6 @@ def sweep(
         raise InputError(f"The values of a list must be equally many, but {seen}. Sweep over a grid, or fill them up.")
     absolute = [axis * now for axis, now in zip(values, present, strict=True)] if relative else list(values)
     points = [axis.ravel() for axis in np.meshgrid(*absolute, indexing="ij")] if grid else absolute
-    paths = tuple((parameter.path, *parameter.tied) for parameter in parameters)
     functions = dict(outputs) if isinstance(outputs, Mapping) else outputs
     at = _AtPoint(model, functions, paths)
     rows = np.stack(points, axis=-1)
@@ -87,19 +87,12 @@ def sweep(
     for name in units or {}:
         if name not in expected:
             raise InputError(f"units names the result {name!r}, but the results are {', '.join(expected)}.")
-    found = batched(
-        at,
-        rows,
-        chunk_size=chunk_size,
-        store=store,
-        executor=executor,
-        progress=progress,
-    )
+    found = batched(at, rows, chunk_size=chunk_size, store=store, executor=executor, progress=progress)
     shape = tuple(axis.size for axis in values) if grid else values[0].shape
-    computed = dict(found.outputs.items())
-    # Where no point could be computed there are no results at all.
-    blank = {name: np.full((len(rows), *inner), np.nan) for name, inner in expected.items() if name not in computed}
-    results = {name: ({**computed, **blank})[name].reshape(*shape, *inner) for name, inner in expected.items()}
+    # Where no point could be computed there are no outputs at all.
+    computed = {name: np.full((len(rows), *inner), np.nan) for name, inner in expected.items()}
+    computed |= found.outputs.items()
+    results = {name: computed[name].reshape(*shape, *inner) for name, inner in expected.items()}
     return Sweep(parameters, values, present, relative, results, dict(units or {}), grid, dict(found.messages))
 
 

@@ -4,7 +4,7 @@ import contextlib
 import dataclasses
 import functools
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,12 +12,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from threadpoolctl import threadpool_limits
 
 from fitting.identification.machine_affine import AffineMachine
 from fitting.identification.machine_evidence import Evidence
+from fitting.shared_out import threads_for_small_matrices
 from twin._checks import InputError
-from twin._cores import usable_cores
 from twin.batch import batched
 from twin.correlation import assign
 
@@ -99,16 +98,14 @@ def in_chunks(
     Raises:
         InputError: a sample at which the function fails.
     """
-    pool = ThreadPoolExecutor(threads or len(usable_cores())) if executor is None else None
-    # Each matrix is small: a library that splits it among all cores only waits for them.
-    with threadpool_limits(1, user_api="blas"), pool or contextlib.nullcontext():
+    with threads_for_small_matrices(threads) if executor is None else contextlib.nullcontext(executor) as workers:
         found = batched(
             _AtPlaces(function, tuple(places)),
             samples,
             mode="chunk",
             chunk_size=CHUNK,
             store=store,
-            executor=pool or executor,
+            executor=workers,
             progress=progress,
         )
     if found.messages:

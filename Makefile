@@ -7,7 +7,7 @@ STAMP := $(VENV)/.synced
 .PHONY: demo test slow bench lint types notebooks lock clean
 
 demo: $(STAMP)
-	$(BIN)/drivetwin demo --out out/demo
+	$(BIN)/drivetwin demo --out out/demo --force
 
 test: $(STAMP)
 	$(BIN)/python -m pytest -n 2 --dist loadfile -q -m "not slow" tests

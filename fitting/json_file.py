@@ -14,9 +14,16 @@ def write_json(path: Path, content: dict[str, Any]) -> None:
         path: the file.
         content: dicts and lists of numbers and text.
     """
-    path.write_text(
-        json.dumps(_without_nan(content), indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8"
-    )
+    path.write_text(as_json(content) + "\n", encoding="utf-8")
+
+
+def as_json(content: dict[str, Any]) -> str:
+    """The text that `write_json` writes.
+
+    Args:
+        content: dicts and lists of numbers and text.
+    """
+    return json.dumps(_without_nan(content), indent=2, allow_nan=False, ensure_ascii=False)
 
 
 def _without_nan(value: Any) -> Any:
@@ -24,4 +31,8 @@ def _without_nan(value: Any) -> Any:
         return {key: _without_nan(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
         return [_without_nan(entry) for entry in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return _without_nan(value.tolist())
+    if isinstance(value, Path):
+        return str(value)
     return None if isinstance(value, float) and not np.isfinite(value) else value

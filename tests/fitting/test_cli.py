@@ -86,3 +86,52 @@ def test_damaged_result_is_named(tmp_path):
     broken.write_bytes(b"PK\x03\x04 not an archive")
     with pytest.raises(ValueError, match=r"fit\.npz is not a readable fit result"):
         FitResult.load(broken, None)
+
+
+def test_results_are_not_written_over_without_being_told(tmp_path, capsys, monkeypatch):
+    def run(folder):
+        (folder / "summary.json").write_text("{}")
+        (folder / "plots").mkdir(exist_ok=True)
+        (folder / "plots" / "fit.png").write_text("")
+        return "done"
+
+    monkeypatch.setattr("fitting.demo.run_demo", run)
+    out = tmp_path / "results"
+    assert main(["demo", "--out", str(out)]) == 0
+    assert main(["demo", "--out", str(out)]) == 2
+    assert "--force" in capsys.readouterr().err
+    (out / "mine.txt").write_text("mine")
+    monkeypatch.setattr("fitting.demo.run_demo", lambda folder: "done")
+    assert main(["demo", "--out", str(out), "--force"]) == 0
+    assert {path.name for path in out.rglob("*") if path.is_file()} == {".drivetwin.json", "mine.txt"}
+
+
+def test_files_of_others_are_not_written_among(tmp_path, capsys):
+    (tmp_path / "thesis.tex").write_text("mine")
+    assert main(["demo", "--out", str(tmp_path)]) == 2
+    assert "holds files already" in capsys.readouterr().err
+
+
+def test_a_run_that_did_not_end_goes_on_in_its_folder(tmp_path, monkeypatch):
+    def stopped(folder):
+        (folder / "half").write_text("")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("fitting.demo.run_demo", stopped)
+    assert main(["demo", "--out", str(tmp_path)]) == 130
+    monkeypatch.setattr("fitting.demo.run_demo", lambda folder: "done")
+    assert main(["demo", "--out", str(tmp_path)]) == 0
+
+
+def test_status_as_json(tmp_path, capsys):
+    batched(np.sum, np.ones((30, 2)), mode="loop", chunk_size=10, store=tmp_path / "study", progress=False)
+    assert main(["study", "status", str(tmp_path / "study"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["chunks"] == [3, 3]
+
+
+def test_every_command_says_what_it_does(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["--help"])
+    assert stop.value.code == 0
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in ("demo", "reproduce", "study"))

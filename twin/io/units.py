@@ -5,7 +5,7 @@ Three readings differ from pint's own, because its own would be silently wrong f
 - pint takes a radian for a plain number, so that it turns 50 Hz into 50 rad/s and 60 rpm into 6.28 Hz. Here a rotation
   (rad/s, rpm) and a frequency (Hz) do not convert into each other.
 - `1/min` and `min^-1` mean revolutions per minute, unless a frequency is expected.
-- `Nm` means newton metre; pint reads something else without complaint.
+- `Nm` means newton metre; pint reads something else without complaint. So `Nms`, `Ns` and `Vs` are products too.
 """
 
 import functools
@@ -22,11 +22,12 @@ if TYPE_CHECKING:
 
 _PER_MINUTE = frozenset({"1/min", "min^-1", "min**-1", "min-1", "/min", "min⁻¹", "1/minute"})
 _REVOLUTIONS_PER_MINUTE = frozenset({"RPM", "U/min", "r/min", "rev/min", "Upm"})
+_SUPERSCRIPTS = {ord("²"): "^2", ord("³"): "^3", ord("⁻"): "^-", ord("¹"): "1"}
 # In order of preference where two have the same dimension, as N m and J.
 _SI_NAMES = (
     *("1", "s", "m", "m/s", "m/s^2", "m/s^3", "rad", "rad/s", "rad/s^2", "rad/s^3", "Hz", "kg", "kg m^2", "K"),
     *("N", "N m", "N/m", "N s/m", "N m/rad", "N m s/rad", "Pa", "W", "A", "V", "ohm", "H"),
-    *("N/A", "N m/A", "N/V", "N m/V", "V s/m", "V s/rad"),
+    *("N/A", "N m/A", "N/V", "N m/V", "V s/m", "V s/rad", "N^2 s/m", "1/s"),
 )
 
 
@@ -126,7 +127,10 @@ def _parse(unit: str, name: str) -> "pint.Unit":
         text = "rpm"
     elif text.replace(" ", "") in _PER_MINUTE:
         text = "1/min"
-    text = re.sub(r"(?<![^\W\d_])([cmkM]?)Nm(?![^\W\d_])", r"\1N*m", text)
+    text = re.sub(r"(?<![^\W\d_])Ohm(?![^\W\d_])", "ohm", text.translate(_SUPERSCRIPTS))
+    text = re.sub(r"(?<![^\W\d_])([cmkM]?)Nms(?![^\W\d_])", r"(\1N*m*s)", text)
+    text = re.sub(r"(?<![^\W\d_])([cmkM]?)Nm(?![^\W\d_])", r"(\1N*m)", text)
+    text = re.sub(r"(?<![^\W\d_])([mk]?)(N|V|A)(\^\d)?s(?![^\W\d_])", r"(\1\2\3*s)", text)
     try:
         if not text or "//" in text:
             raise ValueError("no unit, or a division that rounds")

@@ -1,0 +1,36 @@
+"""`drivetwin modes`."""
+
+import argparse
+from pathlib import Path
+
+from fitting.commands._out_folder import add_out, close_folder, open_folder
+from fitting.commands._outcome import Outcome
+
+HELP = "modes: of a study's model, or measured ones from frequency responses (a universal file)"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="study file (.toml), or frequency responses such as a universal file"
+    )
+    parser.add_argument("--band", nargs=2, type=float, metavar=("LOW", "HIGH"), help="frequencies to look at [Hz]")
+    add_out(parser, "out/modes")
+
+
+def run(options: argparse.Namespace) -> Outcome:
+    """Modes of a model, or measured ones."""
+    if options.file.suffix.lower() == ".toml":
+        from fitting.commands._study_run import run_study
+        from fitting.study.modes_run import run_modes
+
+        options.study = options.file
+        return run_study(options, run_modes)
+    from fitting.identification.modal_report import analyse_file
+    from twin.io._files import existing_file
+
+    existing_file(options.file, "file of frequency responses")
+    folder = open_folder(options.out, force=options.force)
+    text, summary = analyse_file(options.file, folder, band=tuple(options.band) if options.band else None)
+    close_folder(folder)
+    return Outcome(text, summary)

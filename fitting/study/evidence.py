@@ -1,0 +1,155 @@
+"""From the data sets of a study to the evidence that a fit takes."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from fitting.residuals.frequency_response import FrequencyResponseResidual, rest_response
+from fitting.residuals.losses import HuberLoss
+from fitting.residuals.residual import AbstractResidual, JointResidual
+from fitting.residuals.robust import RobustResidual
+from fitting.residuals.set_leaves import WithLeaves
+from fitting.residuals.trajectory import TrajectoryResidual
+from fitting.study.data import RecordData, data_names, read_record
+from fitting.study.responses import ResponseData, read_response
+from fitting.study.study_file import StudyFile
+from twin._checks import InputError
+from twin.control import SampledLoop
+from twin.paths import set_leaves
+from twin.simulation import check_ticks, simulate
+from twin.trajectory import SimulationStatus, Trajectory
+
+
+@dataclasses.dataclass(frozen=True)
+class StudyData:
+    """All data of a study."""
+
+    records: tuple[RecordData, ...]
+    """Records over time."""
+    responses: tuple[ResponseData, ...]
+    """Frequency responses."""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What was assumed or changed on the way."""
+        return tuple(remark for one in (*self.records, *self.responses) for remark in one.remarks)
+
+    def only(self, names: Sequence[str]) -> "StudyData":
+        """The data sets of some names.
+
+        Args:
+            names: names of data sets.
+        """
+        return StudyData(
+            tuple(one for one in self.records if one.name in names),
+            tuple(one for one in self.responses if one.name in names),
+        )
+
+
+def read_data(study: StudyFile) -> StudyData:
+    """Read all data of a study, each checked against the model.
+
+    Args:
+        study: the study.
+
+    Raises:
+        InputError: no data, data that do not belong to the model, or what `read_record` and `read_response` refuse.
+    """
+    records = tuple(read_record(study, name) for name in data_names(study, "record"))
+    responses = tuple(read_response(study, name) for name in data_names(study, "frf"))
+    if not records and not responses:
+        raise study.document.error(("data",), "there are no data. Add a table [data.NAME] with a file and channels.")
+    for one in records:
+        if one.reference is None:
+            raise study.document.error(
+                ("data", one.name),
+                "does not say what drove the drive. Give `reference`, a channel that a closed loop follows, or "
+                '`inputs`, such as inputs = { command = "current" }.',
+            )
+        if isinstance(study.model, SampledLoop):
+            try:
+                check_ticks(one.record.times, study.model.period)
+            except InputError as error:
+                raise study.document.error(
+                    ("data", one.name), f"{error} Give `rate`, that of the controller, to resample."
+                ) from error
+        for path in one.initial:
+            if "free" in study.document.data and path in study.space.paths:
+                raise study.document.error(("data", one.name, "initial", path), "is free as well. Remove one.")
+    return StudyData(records, responses)
+
+
+def evidence_of(data: StudyData, study: StudyFile) -> AbstractResidual:
+    """The residual of all data of a study.
+
+    Args:
+        data: the data.
+        study: the study: stepping, and the loss that its [fit] asks for.
+
+    Raises:
+        InputError: as the residuals do.
+    """
+    parts, names = [], []
+    for one in data.records:
+        if one.reference is None or not one.deviation:
+            continue
+        part = TrajectoryResidual.create(one.record, one.reference, one.deviation, stepping=study.stepping)
+        if one.initial:
+            part = WithLeaves(part, tuple(jnp.asarray(v) for v in one.initial.values()), tuple(one.initial))
+        parts.append(part)
+        names.append(one.name)
+    for one in data.responses:
+        respond = rest_response
+        parts.append(FrequencyResponseResidual(one.measured, one.outputs, one.inputs, one.residual, respond))
+        names.append(one.name)
+    if study.table("fit", known=FIT_KEYS).text("loss", "squares", choices=("squares", "huber")) == "huber":
+        parts = [RobustResidual(part, HuberLoss()) for part in parts]
+    return parts[0] if len(parts) == 1 else JointResidual(tuple(parts), tuple(names))
+
+
+FIT_KEYS = ("starts", "max_steps", "correlated", "loss", "hold_back", "controls", "profile")
+"""Keys of the table [fit]."""
+
+
+def simulate_record(study: StudyFile, model: Any, one: RecordData) -> Trajectory:
+    """What a model does under what drove a record, at the times of the record.
+
+    Args:
+        study: the study, for its stepping.
+        model: the model.
+        one: the record.
+    """
+    started = set_leaves(model, dict(one.initial)) if one.initial else model
+    return _simulated(started, one.reference, one.record.times, study.stepping)
+
+
+@eqx.filter_jit
+def _simulated(model: Any, reference: Any, times: Any, stepping: Any) -> Trajectory:
+    return simulate(model, reference, times, stepping=stepping)
+
+
+def status_of(trajectory: Trajectory) -> str:
+    """Why a simulation did not succeed, empty where it did.
+
+    Args:
+        trajectory: the simulation.
+    """
+    if trajectory.status == SimulationStatus.successful:
+        return ""
+    return str(SimulationStatus[trajectory.status])
+
+
+def relative_error(measured: Any, simulated: Any) -> float:
+    """Root mean square of the difference over that of the measured channel about its mean [-].
+
+    Args:
+        measured: samples.
+        simulated: samples.
+    """
+    measured, simulated = np.asarray(measured), np.asarray(simulated)
+    spread = np.sqrt(np.mean((measured - measured.mean()) ** 2))
+    return float(np.sqrt(np.mean((measured - simulated) ** 2)) / spread) if spread > 0 else float("nan")

@@ -26,7 +26,21 @@ def _as_paths(value: Any) -> Any:
 
 
 class Parameter(eqx.Module):
-    """One free parameter: where it is in the model, its unit, bounds and scale."""
+    """One free parameter: where it is in the model, its unit, bounds and scale.
+
+    Args:
+        path: dotted path into the model, as "friction.coulomb".
+        unit: SI unit of the value.
+        lower: lower bound, in the unit.
+        upper: upper bound, in the unit.
+        scale: "linear", or "log" for a value that is positive and may change by factors.
+        size: typical magnitude on the linear scale.
+        prior: mean and standard deviation of what is known beforehand, in the unit.
+        tied: other paths that always take the same value.
+
+    Raises:
+        InputError: bounds the wrong way round, an unknown scale, a size or a prior that is not positive.
+    """
 
     path: str = eqx.field(static=True)
     """Dotted path into the model, `friction.coulomb`; an index picks an element of a tuple or vector."""
@@ -100,7 +114,14 @@ class Parameter(eqx.Module):
 
 
 class ParameterSpace(eqx.Module):
-    """An ordered set of free parameters of a model: the bridge between a model and a solver's vector."""
+    """An ordered set of free parameters of a model: the bridge between a model and a solver's vector.
+
+    Args:
+        parameters: the free parameters, in the order of the vector.
+
+    Raises:
+        InputError: no parameter, or a path that is there twice.
+    """
 
     parameters: tuple[Parameter, ...]
     """The free parameters, in the order of the vector."""

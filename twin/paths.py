@@ -53,6 +53,13 @@ def get_part(model: Any, path: str) -> Any:
 def set_leaves(model: Model, values: dict[str, Any]) -> Model:
     """The model with the numbers at several dotted paths replaced.
 
+    Args:
+        model: a module.
+        values: new numbers by dotted path, SI.
+
+    Returns:
+        A new model; the one given stays as it is.
+
     Raises:
         InputError: if there is no such path.
     """

@@ -42,6 +42,13 @@ class FrequencyResponseResidual(AbstractResidual):
 
     σ²/2 is the variance of each part, as the measured variance is that of both parts together.
 
+    Args:
+        measured: measured response with its variance.
+        outputs: the model's names of the responses, if they differ from the measured ones.
+        inputs: the model's names of the excitations, if they differ from the measured ones.
+        kind: "complex" or "log".
+        respond: from model and frequencies [Hz] to the response; that at rest if not given.
+
     Raises:
         InputError: unknown kind, measured response without variance, variance not positive, values not finite (for
             "log" also zero), names that do not match the measured response in number.

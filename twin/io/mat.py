@@ -1,48 +1,40 @@
-"""MATLAB files in, by SciPy: the numeric variables of a version 4 to 7 MAT-file."""
+"""MATLAB files in: the numeric variables of a MAT-file of any version."""
 
 import os
+import warnings
 
 import numpy as np
 
 from twin._checks import InputError
 from twin.io._files import existing_file
+from twin.io.formats._mat_tree import mat_tree
+from twin.io.measurement import READ_LIMIT
 
 
-def read_mat(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
+def read_mat(path: str | os.PathLike[str], *, limit: int | None = None) -> dict[str, np.ndarray]:
     """Read the numeric variables of a MAT-file.
 
     Rows and columns become vectors and single numbers 0-d arrays; the number type of the file is kept. Structs, cells,
     text and MATLAB objects are left out.
 
     Args:
-        path: a MAT-file, version 4 to 7.
+        path: a MAT-file, version 4 to 7.3.
+        limit: bytes that may be read; None allows 2 GB.
 
     Returns:
         Arrays by variable name.
 
     Raises:
-        InputError: if the file does not exist, is empty, truncated or no MAT-file, or has version 7.3.
+        InputError: if the file does not exist, is empty, truncated or no MAT-file, or larger than the limit.
     """
-    import scipy.io  # a quarter of a second to import
-
     file = existing_file(path, "MAT-file")
-    try:
-        variables = scipy.io.loadmat(file, appendmat=False)
-    except NotImplementedError as error:
-        raise InputError(
-            f"MAT-file {str(file)!r} has version 7.3 (HDF5), which cannot be read yet. "
-            "Save it again in MATLAB with save(..., '-v7')."
-        ) from error
-    except Exception as error:  # a damaged file makes SciPy raise nearly anything: zlib, struct, type and value errors
-        raise InputError(
-            f"MAT-file {str(file)!r} cannot be read ({type(error).__name__}: {error}): it is truncated, damaged or "
-            "no MAT-file. Copy or export it again and compare its size with the original."
-        ) from error
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        variables = mat_tree(file, READ_LIMIT if limit is None else limit)
     return {
         name: value.reshape(()) if value.size == 1 else value.ravel() if 1 in value.shape else value
         for name, value in variables.items()
-        if isinstance(name, str) and not name.startswith("__")
-        if isinstance(value, np.ndarray) and value.dtype.kind in "biufc"
+        if isinstance(value, np.ndarray) and not name.startswith("__")
     }
 
 

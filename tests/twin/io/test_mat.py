@@ -1,3 +1,4 @@
+import h5py
 import numpy as np
 import pytest
 import scipy.io
@@ -44,8 +45,18 @@ def test_truncated_file(file, kept):
 def test_version_7_3(tmp_path):
     path = tmp_path / "new.mat"
     head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
-    path.write_bytes(head + bytes(384) + b"\x89HDF\r\n\x1a\n" + bytes(100))
-    with pytest.raises(InputError, match=r"new\.mat.*7\.3.*-v7"):
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["table"] = np.arange(6.0).reshape(3, 2)  # MATLAB stores columns first
+        file["gain"] = np.full((1, 1), 2.5)
+        file["label"] = np.frombuffer("text".encode("utf-16-le"), np.uint16).reshape(-1, 1)
+        file["label"].attrs["matlab_class"] = np.bytes_("char")
+    content = path.read_bytes()
+    path.write_bytes(head + content[128:])
+    variables = read_mat(path)
+    assert set(variables) == {"table", "gain"} and variables["gain"] == 2.5
+    np.testing.assert_array_equal(variables["table"], [[0, 2, 4], [1, 3, 5]])
+    path.write_bytes((head + content[128:])[:700])
+    with pytest.raises(InputError, match=r"new\.mat.*truncated"):
         read_mat(path)
 
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import ArrayLike
 
+from fitting.controls.relative_error import relative_error
 from twin._checks import InputError
 from twin.record import Record
 
@@ -51,8 +52,7 @@ class Compared(NamedTuple):
     @property
     def relative(self) -> float:
         """Size of the error over that of the measurement about its mean; NaN for a constant one [-]."""
-        moving = float(np.linalg.norm(self.measured - self.measured.mean()))
-        return float(np.linalg.norm(self.error)) / moving if moving > 0 else float("nan")
+        return relative_error(self.measured, self.error)
 
 
 def compared(

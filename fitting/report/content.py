@@ -52,6 +52,8 @@ class Table:
     """Cells, row by row."""
     caption: str = ""
     """What the table shows."""
+    folded: bool = False
+    """Whether it is shown on demand, below the pictures."""
     map: bool = False
     """Whether it is a map of tinted cells, whose columns are narrow and whose heads stand upright."""
 

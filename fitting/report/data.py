@@ -59,7 +59,7 @@ def _traces(name: str, record: Record) -> Figure:
         caption=f"{name}: measured channels over time.",
         panels=len(channels),
         wide=True,
-        height=1.25,
+        height=1.35,
     )
 
 
@@ -69,6 +69,6 @@ def _draw(record: Record, channels: list[str], axes: np.ndarray) -> None:
         values = np.asarray(record.channel(channel))
         kept = thinned(ax, values)
         ax.plot(times[kept], values[kept], color="0.35", lw=0.8)
-        ax.set_ylabel(f"{channel}\n[{record.units[channel]}]")
+        ax.set_title(f"{channel} [{record.units[channel]}]", loc="left", fontsize=8.5, color="0.3")
         ax.margins(x=0)
     axes[-1].set_xlabel("time [s]")

@@ -4,13 +4,14 @@ from typing import TYPE_CHECKING
 
 from fitting.report.colours import PALETTE
 from fitting.report.content import Figure
+from fitting.report.numbers import given
 from fitting.report.svg import in_page
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
-WIDTHS = {"broad": 10.0, "narrow": 4.1, "all": 5.2}
+WIDTHS = {"broad": 10.0, "narrow": 4.1, "all": 4.6}
 """Width of a drawing by the screen that it is for [inch]."""
 _LETTERS_PER_INCH = 13
 
@@ -69,17 +70,21 @@ def drawn(figure: Figure, screen: str, key: str) -> str:
         FigureCanvasSVG(canvas)
         axes = canvas.subplots(figure.panels, 1, sharex=True, squeeze=False).ravel()
         figure.draw(axes)
-        _tidy(canvas, WIDTHS[screen])
+        _tidy(canvas, WIDTHS[screen], figure.panels)
         out = io.StringIO()
         canvas.savefig(out, format="svg", metadata={"Date": None})
     return in_page(out.getvalue(), key, figure.alt)
 
 
-def _tidy(canvas: "Canvas", width: float) -> None:
+def _tidy(canvas: "Canvas", width: float, panels: int) -> None:
     """Legends above the axes, where they hide nothing; titles are the caption's business."""
     for ax in canvas.axes:
         ax.set_title("")
         _move_legend(ax, width)
+        _label_powers(ax)
+        room = int(_LETTERS_PER_INCH * canvas.get_figheight() / panels)
+        ax.set_ylabel("\n".join(_shortened(line, max(room, 12)) for line in ax.get_ylabel().split("\n")))
+        ax.set_xlabel(_shortened(ax.get_xlabel(), int(_LETTERS_PER_INCH * width)))
     canvas.align_ylabels()
 
 
@@ -106,3 +111,31 @@ def _move_legend(ax: "Axes", width: float) -> None:
         handlelength=1.5,
         columnspacing=1.4,
     )
+
+
+def _label_powers(ax: "Axes") -> None:
+    """Ticks of logarithmic axes, which matplotlib writes as formulas, in plain letters."""
+    from matplotlib.ticker import FuncFormatter, LogFormatter, LogLocator, NullFormatter
+
+    for axis in (ax.xaxis, ax.yaxis):
+        if not isinstance(axis.get_major_formatter(), LogFormatter):
+            continue
+        low, high = axis.get_view_interval()
+        if high < 30 * low:
+            # Less than two powers in sight would leave the axis with one number or none.
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: _power(value)))
+        axis.set_minor_formatter(NullFormatter())
+
+
+def _power(value: float) -> str:
+    text = given(value)
+    return text.removeprefix("1·") if text.startswith("1·10") else text
+
+
+def _shortened(text: str, most: int) -> str:
+    """A text with its middle left out where it is too long."""
+    if len(text) <= most:
+        return text
+    end = most // 2
+    return f"{text[: most - end - 1]}…{text[-end:]}"

@@ -150,6 +150,37 @@ def plot_autocorrelation(
     return ax
 
 
+def plot_spectrum(
+    residual: FitResult | ArrayLike, period: float, *, unit: str = "-", ax: "Axes | None" = None
+) -> "Axes":
+    """Amplitude spectral density (Welch), with the level of white noise of the same deviation.
+
+    Args:
+        residual: as in `plot_diagnostics`, one series.
+        period: time between two samples [s].
+        unit: unit of the residual.
+        ax: axes to draw in; new ones if not given.
+
+    Raises:
+        InputError: a period that is not positive, nothing finite to draw.
+    """
+    from scipy import signal
+
+    if not period > 0:
+        raise InputError(f"period must be positive, but is {period} s.")
+    ax, values = axes_or_new(ax), _finite(residual)
+    length = min(values.size, max(64, values.size // 8))
+    frequency, density = signal.welch(values, 1 / period, nperseg=length, detrend="constant")
+    ax.plot(frequency[1:], np.sqrt(density[1:]), color=_BLUE, lw=1.0)
+    ax.axhline(float(np.std(values)) * np.sqrt(2 * period), label="white noise", **_LINE)
+    ax.set_yscale("log")
+    ax.set_xlabel("frequency [Hz]")
+    ax.set_ylabel(f"density [{'1' if unit == '-' else unit}/√Hz]")
+    ax.margins(x=0)
+    ax.legend(fontsize="small", loc="upper right")
+    return ax
+
+
 def _values(residual: FitResult | ArrayLike) -> np.ndarray:
     if isinstance(residual, FitResult):
         priors = sum(p.prior is not None for p in residual.space.parameters)

@@ -1,0 +1,70 @@
+"""Section: the parameters."""
+
+import numpy as np
+
+from fitting.identifiability import IDENTIFIED, IdentifiabilityReport
+from fitting.report.content import Bar, Cell, Section, Table
+from fitting.report.numbers import given, plain, together, with_error
+from fitting.result import FitResult
+
+
+def parameters_section(result: FitResult, identifiability: IdentifiabilityReport | None = None) -> Section:
+    """Estimates with standard errors, intervals, their place within the bounds, and what the data say about each.
+
+    Args:
+        result: the fit.
+        identifiability: verdicts on its parameters, if there are any.
+    """
+    low, high = result.intervals().T
+    errors = result.standard_errors
+    rows = []
+    for i, p in enumerate(result.space.parameters):
+        value, error = float(result.values[i]), float(errors[i])
+        ends = (float(low[i]), float(high[i]))
+        known = bool(np.all(np.isfinite(ends)))
+        rows.append(
+            (
+                Cell(p.path, "name"),
+                Cell(with_error(value, error), "number"),
+                Cell(p.unit or "–"),
+                Cell(together(ends, error, "{} … {}") if known else "–", "number"),
+                _bar(result, i),
+                _verdict(result, i, identifiability),
+            )
+        )
+    head = ("Parameter", "Estimate ± standard error", "Unit", "95 % interval", "Between its bounds", "Verdict")
+    remarks = [result.message]
+    if identifiability is not None:
+        remarks.append(identifiability.message)
+    return Section(
+        "Parameters",
+        text="The bar is the way from the lower to the upper bound on the parameter's scale, the dot the estimate, the "
+        "band its 95 % interval.",
+        tables=(Table(head, tuple(rows), "Estimates"),),
+        remarks=tuple(remarks),
+    )
+
+
+def _bar(result: FitResult, i: int) -> Cell:
+    parameter = result.space.parameters[i]
+    lower, upper = (float(parameter.to_scaled(bound)) for bound in (parameter.lower, parameter.upper))
+    words = f"{plain(float(result.values[i]))} between {given(parameter.lower)} and {given(parameter.upper)}"
+    if not (np.isfinite(lower) and np.isfinite(upper)):
+        return Cell("not bounded")
+    interval = result.intervals()[i]
+    ends = [float(parameter.to_scaled(end)) if np.isfinite(end) else float("nan") for end in interval]
+    at, low, high = (
+        float(np.clip((x - lower) / (upper - lower), 0.0, 1.0)) if np.isfinite(x) else None
+        for x in (float(result.scaled[i]), *ends)
+    )
+    at = 0.5 if at is None else at
+    return Cell(words, bar=Bar(at, at if low is None else low, at if high is None else high, words))
+
+
+def _verdict(result: FitResult, i: int, report: IdentifiabilityReport | None) -> Cell:
+    if report is not None:
+        verdict = report[result.space.paths[i]]
+        return Cell(verdict.sentence, "good" if verdict.kind == IDENTIFIED else "bad")
+    if result.active[i]:
+        return Cell("at a bound", "bad")
+    return Cell("not determined", "bad") if result.unseen[i] else Cell("–")

@@ -161,7 +161,7 @@ def _measured(table: TomlTable, name: str) -> tuple[Record, list[str]]:
         if isinstance(entry, dict) and entry.get("from_zero"):
             values = record.channel(channel)
             record = record.with_channel(channel, values - values[0], record.units[channel])
-    return record, [f"{name}: {remark}" for remark in (*measurement.remarks, *prepared.remarks)]
+    return record, [f"{name}: {remark}" for remark in prepared.remarks]
 
 
 def _reference(study: StudyFile, table: TomlTable, record: Record) -> AbstractReference | None:

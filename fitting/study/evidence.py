@@ -8,7 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from fitting.residuals.frequency_response import FrequencyResponseResidual, rest_response
+from fitting.residuals.frequency_response import FrequencyResponseResidual
 from fitting.residuals.losses import HuberLoss
 from fitting.residuals.residual import AbstractResidual, JointResidual
 from fitting.residuals.robust import RobustResidual
@@ -103,8 +103,7 @@ def evidence_of(data: StudyData, study: StudyFile) -> AbstractResidual:
         parts.append(part)
         names.append(one.name)
     for one in data.responses:
-        respond = rest_response
-        parts.append(FrequencyResponseResidual(one.measured, one.outputs, one.inputs, one.residual, respond))
+        parts.append(FrequencyResponseResidual(one.measured, one.outputs, one.inputs, one.residual, one.respond))
         names.append(one.name)
     if study.table("fit", known=FIT_KEYS).text("loss", "squares", choices=("squares", "huber")) == "huber":
         parts = [RobustResidual(part, HuberLoss()) for part in parts]

@@ -5,7 +5,7 @@
 "plant.friction.coulomb" = { lower = "0 N", upper = "200 N", prior = ["20 N", "5 N"] }
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from twin._checks import InputError
@@ -40,6 +40,19 @@ def free_parameters(document: TomlDocument, model: Any) -> ParameterSpace:
     for parameter, key in zip(parameters, _entries(document, ("free",)), strict=True):
         _checked(document, key, lambda p=parameter: ParameterSpace([p]).check_start(model))
     return space
+
+
+def free_text(space: ParameterSpace, data: Sequence[str], held: Sequence[str] = ()) -> str:
+    """What a fit is asked, in a sentence.
+
+    Args:
+        space: the free parameters.
+        data: names of the data sets.
+        held: names of those held back.
+    """
+    fitted = [name for name in data if name not in held]
+    told = f"Estimate {len(space)} parameters from {', '.join(fitted)}."
+    return told + (f" Predict {', '.join(held)} with them." if held else "")
 
 
 def _entries(document: TomlDocument, key: Key) -> Iterator[Key]:

@@ -9,15 +9,16 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from twin._checks import InputError
 from twin.control import DelayedPlant, FrictionSlope, SampledLoop
 from twin.drives import RackPinionDrive
 from twin.drives.friction_slope import friction_slope
 from twin.drives.rack_pinion_operation import steady_motion
+from twin.frf import FRF
 from twin.laws import AbstractFriction, AbstractStaticFriction
-from twin.linear import StateSpace, linearise
+from twin.linear import StateSpace, frequency_response, linearise
 from twin.modal import damped_modes
 from twin.plant import AbstractPlant
 
@@ -43,6 +44,25 @@ class OperatingPoint(NamedTuple):
     """Speed of every friction law [m/s or rad/s]; None for a fast motion."""
     preload: float = 0.0
     """Preload torque, for drives that have one [Nm]."""
+
+
+class MovingResponse(NamedTuple):
+    """Frequency response of a model at an operating point, as a function of model and frequencies."""
+
+    at: OperatingPoint
+    """The operating point."""
+
+    def __call__(self, model: Any, frequency: Float[ArrayLike, "frequencies"]) -> FRF:
+        """The response of all outputs to all inputs.
+
+        Args:
+            model: as in `linear_model`.
+            frequency: frequencies [Hz].
+
+        Raises:
+            InputError: a model that cannot be linearised.
+        """
+        return frequency_response(linear_model(model, self.at), jnp.asarray(frequency))
 
 
 def linear_model(model: Any, at: OperatingPoint | None = None) -> StateSpace:

@@ -13,6 +13,8 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 
+from fitting.study.model_modes import MovingResponse
+from fitting.study.operating_point import KEYS, operating_point
 from fitting.study.study_file import StudyFile
 from twin._checks import InputError
 from twin.frf import FRF, local_polynomial_variance
@@ -20,7 +22,7 @@ from twin.io.quantity import parse_quantity
 from twin.io.toml_document import unknown
 from twin.io.toml_table import TomlTable
 
-_KEYS = ("kind", "file", "format", "read", "band", "outputs", "inputs", "residual", "variance")
+_KNOWN = ("kind", "file", "format", "read", "band", "outputs", "inputs", "residual", "variance", *KEYS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,6 +39,8 @@ class ResponseData:
     """The model's names of the inputs, in order."""
     residual: str
     """"log" or "complex", see `FrequencyResponseResidual`."""
+    respond: MovingResponse
+    """From a model and frequencies [Hz] to its response, at the operating point of the measurement."""
     remarks: tuple[str, ...]
     """What was assumed."""
 
@@ -51,7 +55,7 @@ def read_response(study: StudyFile, name: str) -> ResponseData:
     Raises:
         InputError: naming the line and key of the study file, or what is wrong with the data file.
     """
-    table = study.table("data", name, known=_KEYS, required=True)
+    table = study.table("data", name, known=_KNOWN, required=True)
     from twin.io.frf_file import read_frf
 
     path = table.document.folder / table.text("file")
@@ -71,7 +75,8 @@ def read_response(study: StudyFile, name: str) -> ResponseData:
         frf = frf.with_variance(_scatter(frf, table))
         remarks.append(f"{name}: variance of the response read from the scatter of neighbouring lines.")
     kind = table.text("residual", "log", choices=("log", "complex"))
-    return ResponseData(name, frf, tuple(rows), tuple(columns), kind, tuple(remarks))
+    respond = MovingResponse(operating_point(table, study.model))
+    return ResponseData(name, frf, tuple(rows), tuple(columns), kind, respond, tuple(remarks))
 
 
 def _band(table: TomlTable) -> tuple[float, float]:

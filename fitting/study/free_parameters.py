@@ -5,6 +5,7 @@
 "plant.friction.coulomb" = { lower = "0 N", upper = "200 N", prior = ["20 N", "5 N"] }
 """
 
+import dataclasses
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -53,6 +54,29 @@ def free_text(space: ParameterSpace, data: Sequence[str], held: Sequence[str] = 
     fitted = [name for name in data if name not in held]
     told = f"Estimate {len(space)} parameters from {', '.join(fitted)}."
     return told + (f" Predict {', '.join(held)} with them." if held else "")
+
+
+def without_prefix(space: ParameterSpace, prefix: str) -> ParameterSpace:
+    """The space of a part of the model.
+
+    Args:
+        space: the free parameters of the whole.
+        prefix: path of the part, with its dot.
+
+    Raises:
+        InputError: a parameter that is not in that part.
+    """
+    for parameter in space.parameters:
+        if not all(path.startswith(prefix) for path in (parameter.path, *parameter.tied)):
+            raise InputError(
+                f"{parameter.path} is not in {prefix[:-1]!r}, which alone is searched. Remove it from [free]."
+            )
+    return ParameterSpace(
+        dataclasses.replace(
+            p, path=p.path.removeprefix(prefix), tied=tuple(path.removeprefix(prefix) for path in p.tied)
+        )
+        for p in space.parameters
+    )
 
 
 def _entries(document: TomlDocument, key: Key) -> Iterator[Key]:

@@ -23,7 +23,7 @@ MEASURES = PositioningPerformance(*(jnp.asarray(v) for v in ([1e-3, -2e-3, 0.0],
 
 @pytest.mark.slow
 def test_reaches_the_optimum_of_a_fine_sweep_in_fewer_runs_than_a_coarse_one():
-    fine = sweep(CYCLE, cycle_performance, {GAIN: np.geomspace(8.0, 120.0, 1001)}, chunk_size=143)
+    fine = sweep(CYCLE, {GAIN: np.geomspace(8.0, 120.0, 1001)}, cycle_performance, chunk_size=143)
     costs = OBJECTIVE.sharp_cost(PositioningPerformance(*(jnp.asarray(fine[n]) for n in ("error", "energy", "time"))))
     result = design_gain(CYCLE, OBJECTIVE, (8.0, 120.0))
     assert result.success

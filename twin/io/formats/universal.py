@@ -97,7 +97,9 @@ def _channel(
     unit = _unit(one, "ordinate", units, remarks)
     if kind == 4:
         below = _unit(one, "orddenom", units, remarks)
-        unit = f"({unit})/({below})" if unit and below else ""
+        unit = (
+            f"{unit}/({below})" if unit and re.search(r"[^\w]", below) else f"{unit}/{below}" if unit and below else ""
+        )
     if x.size > 1 and not np.any(np.diff(x)):
         remarks.append(f"{name!r} has no abscissa; its values are only counted.")
         return MeasuredChannel(name, data, unit)

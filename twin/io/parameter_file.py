@@ -22,7 +22,6 @@ import math
 import os
 import re
 import tomllib
-import uuid
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +29,7 @@ from typing import Any
 
 from twin._checks import InputError
 from twin.io._files import existing_file
+from twin.io._whole_file import whole_file
 
 _FIRST_LINE = "# drivetwin parameter file"
 _LAST_LINE = "#--- end of parameter file ---"
@@ -100,18 +100,8 @@ def write_parameters(path: str | os.PathLike[str], entries: Iterable[ParameterEn
         content = text.encode("utf-8")
     except UnicodeEncodeError as error:
         raise InputError(f"the parameters for {str(file)!r} hold text that UTF-8 cannot encode: {error}.") from error
-    target = file.resolve()
-    if not target.parent.is_dir():
-        raise InputError(f"the folder of {str(file)!r} does not exist. Create it first, or correct the path.")
-    temporary = target.with_name(f".{target.name}.{uuid.uuid4().hex}.tmp")
-    try:
-        with temporary.open("xb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with whole_file(file) as temporary:
+        temporary.write_bytes(content)
     return file
 
 

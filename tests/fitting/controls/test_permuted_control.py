@@ -35,6 +35,7 @@ def test_a_model_of_its_data_cannot_explain_shuffled_ones(evidence):
     assert "as it should be" in control.sentence
 
 
+@pytest.mark.slow
 def test_a_curve_through_everything_explains_shuffled_data_too():
     """The noise hides the jumps between blocks; a model of these data would still be told apart."""
     noisy = record_of(TRUTH, noise=0.5)[1]

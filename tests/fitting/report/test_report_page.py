@@ -1,16 +1,15 @@
 """The page of a report: well formed, without outside addresses, escaped, whole, and the same for the same input."""
 
 import re
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
 from fitting.report import Bar, Cell, Figure, Folded, Report, Section, Table, page_of, write_report
+from tests.fitting.report.html_page import Page
 from twin._checks import InputError
 
 EVIL = '<script>alert("x")</script> & $a$ _b'
-VOID = {"meta", "br", "wbr", "hr", "img", "link", "input"}
 
 
 def draw(axes):
@@ -27,32 +26,6 @@ def small(**changes):
     section = Section(EVIL, EVIL, figures, (table,), (EVIL,), (Folded(EVIL, EVIL),))
     report = {"warnings": (EVIL,), "sections": (section,), "facts": ((EVIL, EVIL),), "stamp": EVIL}
     return Report(EVIL, Section("What was asked"), **{**report, **changes})
-
-
-class Page(HTMLParser):
-    """Looks whether every element ends where it should, and keeps what starts."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.seen = [], []
-        self.feed(text)
-        self.close()
-        assert not self.open
-
-    def handle_starttag(self, tag, attrs):
-        self.seen.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open and self.open[-1] == tag, (tag, self.open, self.getpos())
-        self.open.pop()
-
-    def handle_startendtag(self, tag, attrs):
-        self.seen.append((tag, dict(attrs)))
-
-    def all(self, tag):
-        return [attrs for name, attrs in self.seen if name == tag]
 
 
 def test_page_is_well_formed_and_says_who_is_who():

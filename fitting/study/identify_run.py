@@ -55,6 +55,10 @@ def run_identify(study: StudyFile, out: Path) -> Outcome:
         asked=Asked(f"{name}: {procedure.HELP}.", "", study.document.text, whole["versions"], {"Procedure": name}),
         result=found.result,
         responses=found.responses,
+        records=found.records,
+        identifiability=found.verdicts,
+        many=found.many,
+        controls=found.controls,
     )
     found.result.save(out / "fit.npz")
     page = write_report(out / "report.html", report)

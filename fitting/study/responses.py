@@ -56,7 +56,7 @@ def read_response(study: StudyFile, name: str) -> ResponseData:
         InputError: naming the line and key of the study file, or what is wrong with the data file.
     """
     table = study.table("data", name, known=_KNOWN, required=True)
-    from twin.io.frf_file import read_frf
+    from twin.io.frf_table import read_frf
 
     path = table.document.folder / table.text("file")
     options = dict(table.table("read"))

@@ -1,9 +1,14 @@
 """What a procedure found."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from fitting.controls import Control
+from fitting.identifiability import IdentifiabilityReport
+from fitting.multistart import MultistartResult
 from fitting.result import FitResult
 from twin.frf import FRF
+from twin.record import Record
 
 
 class Found(NamedTuple):
@@ -17,3 +22,11 @@ class Found(NamedTuple):
     """The fit behind it, for the report."""
     responses: dict[str, tuple[FRF, FRF]] | None = None
     """Measured and fitted responses, for the report."""
+    records: dict[str, Record] | None = None
+    """Records, for the report."""
+    verdicts: IdentifiabilityReport | None = None
+    """What the data can tell, for the report."""
+    many: MultistartResult | None = None
+    """All starts, for the report."""
+    controls: Sequence[Control] = ()
+    """Controls, for the report."""

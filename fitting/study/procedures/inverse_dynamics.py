@@ -11,6 +11,7 @@ import jax.numpy as jnp
 
 from fitting.identification.inverse_dynamics import inverse_dynamics
 from fitting.study.data import data_names, read_record
+from fitting.study.free_parameters import without_prefix
 from fitting.study.procedures._found import Found
 from fitting.study.study_file import StudyFile
 from twin.control import SampledLoop
@@ -47,8 +48,6 @@ def run(study: StudyFile, table: TomlTable, out: Path) -> Found:
     space = study.space
     model = study.model
     if axis is not model:
-        from fitting.study.free_parameters import without_prefix
-
         space, model = without_prefix(space, "plant."), axis
     result = inverse_dynamics(record, model, space, decimation=table.integer("decimation", 10))
     summary = {

@@ -1,0 +1,89 @@
+"""`drivetwin new`: a commented study file for a chosen drive."""
+
+import importlib
+import pkgutil
+import re
+from pathlib import Path
+from typing import Any
+
+from fitting.study import drives
+from twin._checks import InputError
+from twin.io.model_text import model_text
+from twin.io.toml_document import unknown
+
+
+_EXAMPLE = r"^\[data\.(\w+)\]\n(.*?)(?=\n\n)\n\n\[data\.\1\.channels\][^\n]*\n(.*?)(?=\n\n)"
+# What a look at a file calls a channel, and what the examples call it.
+_ALIASES = {"position_setpoint": "set", "current": "command", "voltage": "command", "torque": "command"}
+
+
+def known_drives() -> dict[str, Any]:
+    """Drives that a study file is written for, by name."""
+    names = sorted(found.name for found in pkgutil.iter_modules(drives.__path__) if not found.name.startswith("_"))
+    return {name.replace("_", "-"): importlib.import_module(f"{drives.__name__}.{name}") for name in names}
+
+
+def new_study(drive: str, *, data: Path | None = None) -> str:
+    """The text of a study file.
+
+    Args:
+        drive: name of the drive, as in `known_drives`.
+        data: a file of measurements whose channels are to be listed; None for an example.
+
+    Raises:
+        InputError: an unknown drive, or a file that cannot be read.
+    """
+    known = known_drives()
+    name = drive.replace("_", "-")
+    if name not in known:
+        raise InputError(unknown("drive", drive, known))
+    module = known[name]
+    head = (
+        f"# Study file of drivetwin: {module.HELP}.\n"
+        "# Quantities are text with their unit, in any unit of the right dimension; keys are paths into the model.\n"
+        "# Commands: drivetwin fit, rank, sweep, simulate, frf, modes, identify STUDY.toml; each reads its table.\n\n"
+        f'[study]\ntitle = "{name}"\nseed = 1\n\n'
+    )
+    rest = module.REST
+    if data is not None:
+        rest = _with_channels(rest, data)
+    return head + model_text(module.model()) + rest
+
+
+def _with_channels(rest: str, data: Path) -> str:
+    """The example's channels replaced by those of a file."""
+    from twin.io.look import look
+    from twin.io.measurement import read_measurement
+
+    lines = look(read_measurement(data)).study.strip().split("\n")
+    if not lines[0].startswith("[data."):
+        raise InputError(f"{str(data)!r} has no channels over time. Look at it by: drivetwin look {data}")
+    own = lines[0][len("[data.") : -1]
+    block = re.search(
+        r"^\[data\.(\w+)\]\n(.*?)(?=\n\n)\n\n\[data\.\1\.channels\][^\n]*\n(.*?)(?=\n\n)", rest, re.M | re.S
+    )
+    if block is None:
+        return rest + "\n" + "\n".join(lines) + "\n"
+    there = data.resolve().as_posix()
+    kept = [line for line in block.group(2).split("\n") if not line.startswith("file")]
+    example = re.findall(r"^(\w+) =", block.group(3), re.MULTILINE)
+    channels = _renamed(lines[lines.index(f"[data.{own}.channels]") + 1 :], example)
+    times = [line for line in lines[1:] if line.startswith("time")]
+    new = [f"[data.{block.group(1)}]", f'file = "{there}"', *times, *kept, ""]
+    new += [f"[data.{block.group(1)}.channels]        # names on the left must be those of the model:"]
+    new += [f"# it had: {line}" for line in block.group(3).split("\n")]
+    return rest[: block.start()] + "\n".join([*new, *channels]) + rest[block.end() :]
+
+
+def _renamed(lines: list[str], example: list[str]) -> list[str]:
+    """The lines of a file's channels, those that the example has under another name renamed."""
+    taken = {line.split(" = ")[0] for line in lines}
+    found = []
+    for line in lines:
+        name, equals, rest = line.partition(" = ")
+        alias = _ALIASES.get(name, "")
+        if name not in example and alias in example and alias not in taken:
+            name = alias
+            taken.add(alias)
+        found.append(f"{name}{equals}{rest}")
+    return found

@@ -169,7 +169,7 @@ def plot_spectrum(
     if not period > 0:
         raise InputError(f"period must be positive, but is {period} s.")
     ax, values = axes_or_new(ax), _finite(residual)
-    length = min(values.size, max(64, values.size // 8))
+    length = min(values.size, max(64, min(values.size // 24, 4096)))
     frequency, density = signal.welch(values, 1 / period, nperseg=length, detrend="constant")
     ax.plot(frequency[1:], np.sqrt(density[1:]), color=_BLUE, lw=1.0)
     ax.axhline(float(np.std(values)) * np.sqrt(2 * period), label="white noise", **_LINE)

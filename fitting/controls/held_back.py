@@ -47,12 +47,12 @@ class HeldBack(NamedTuple):
             for name, value in self.errors.items()
             if name in self.fitted_errors
         )
-        size = f"the weighted residual is {self.rms:.3g} there and {self.fitted_rms:.3g} on the fitted data"
+        size = f"the weighted residual is {short(self.rms)} there and {short(self.fitted_rms)} on the fitted data"
         relative = f"; relative errors: {errors}" if errors else ""
         if self.passed:
             return f"Data that were held back are predicted about as well as the fitted ones: {size}{relative}."
         return (
-            f"Data that were held back are predicted {self.ratio:.3g} times worse than the fitted ones: {size}"
+            f"Data that were held back are predicted {short(self.ratio)} times worse than the fitted ones: {size}"
             f"{relative}. The model has too much freedom, or the data held back show what it lacks. Free fewer "
             "parameters, or fit data that cover the same speeds, positions and loads."
         )
@@ -118,6 +118,15 @@ def held_back_share(
     parts = hold_back(evidence, share=share)
     result = fit(parts.fitted, model, space, max_steps=max_steps)
     return held_back(parts.fitted, parts.kept, result.model, limit=limit, name=f"{100 * share:.3g} % held back")
+
+
+def short(value: float) -> str:
+    """A number for a sentence, with three digits.
+
+    Args:
+        value: the number.
+    """
+    return f"{value:.3g}" if not 1e3 <= abs(value) < 1e9 else f"{value:.0f}"
 
 
 def rms_of(evidence: AbstractResidual, model: Any) -> float:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fitting.controls.held_back import rms_of
+from fitting.controls.held_back import rms_of, short
 from fitting.controls.parts import with_parts
 from fitting.fit import fit
 from fitting.residuals.frequency_response import FrequencyResponseResidual
@@ -47,7 +47,7 @@ class Permuted(NamedTuple):
     @property
     def sentence(self) -> str:
         """The result in words."""
-        size = f"a weighted residual of {self.rms:.3g} against {self.fitted_rms:.3g}"
+        size = f"a weighted residual of {short(self.rms)} against {short(self.fitted_rms)}"
         if self.passed:
             return f"Shuffled data are not described, as it should be: {size}."
         return (

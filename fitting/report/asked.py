@@ -52,7 +52,7 @@ def _free(space: ParameterSpace) -> Table:
     for p in space.parameters:
         row = [
             Cell(p.path, "name"),
-            Cell(p.unit or "–"),
+            Cell(p.unit or "–", "unit"),
             Cell(given(p.lower), "number"),
             Cell(given(p.upper), "number"),
         ]

@@ -28,7 +28,7 @@ def comparison_section(series: Sequence[Compared]) -> Section:
             percent(one.relative),
             "–" if weighted is None else plain(float(np.sqrt(np.mean(weighted**2))), 3),
         )
-        rows.append((Cell(one.record), Cell(one.channel, "name"), Cell(one.unit), *number_cells(numbers)))
+        rows.append((Cell(one.record), Cell(one.channel, "name"), Cell(one.unit, "unit"), *number_cells(numbers)))
     figures = []
     for record in dict.fromkeys(one.record for one in series):
         members = [one for one in series if one.record == record]

@@ -26,7 +26,7 @@ class Cell(NamedTuple):
     text: str
     """What it says."""
     kind: str = "text"
-    """"text", "number" (to the right), "name" (of a parameter or channel), "good" or "bad" (marked)."""
+    """"text", "unit", "number" (to the right), "name" (of a parameter or channel), "good" or "bad" (marked)."""
     tint: float | None = None
     """Share of colour behind it: from -1 (one colour) to 1 (the other); none if not given."""
     bar: Bar | None = None

@@ -25,7 +25,7 @@ def records_section(records: Mapping[str, Record], remarks: Mapping[str, Sequenc
         for channel, samples in record.channels.items():
             values = np.asarray(samples)
             numbers = (values.min(), values.max(), values.mean(), values.std())
-            names = (Cell(name), Cell(channel, "name"), Cell(record.units[channel]))
+            names = (Cell(name), Cell(channel, "name"), Cell(record.units[channel], "unit"))
             rows.append((*names, *number_cells(plain(float(x)) for x in numbers)))
     head = ("Record", "Channel", "Unit", "Least", "Greatest", "Mean", "Standard deviation")
     words = [f"{name}: {remark}" for name, lines in (remarks or {}).items() for remark in lines]

@@ -59,15 +59,19 @@ def drawn(figure: Figure, screen: str, key: str) -> str:
         key: beginning of all names inside the drawing; different for each drawing of a page.
     """
     import io
+    import warnings
 
     import matplotlib.style
     from cycler import cycler
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure as Canvas
 
-    with matplotlib.style.context(["default", {**_STYLE, "axes.prop_cycle": cycler(color=PALETTE)}]):
+    style = {**_STYLE, "axes.prop_cycle": cycler(color=PALETTE)}
+    with matplotlib.style.context(["default", style]), warnings.catch_warnings():
         canvas = Canvas(figsize=(WIDTHS[screen], figure.height * figure.panels + 0.35), layout="constrained")
         FigureCanvasSVG(canvas)
+        # The browser has letters for names that matplotlib's font has not.
+        warnings.filterwarnings("ignore", message="Glyph")
         axes = canvas.subplots(figure.panels, 1, sharex=True, squeeze=False).ravel()
         figure.draw(axes)
         _tidy(canvas, WIDTHS[screen], figure.panels)

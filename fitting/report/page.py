@@ -32,7 +32,7 @@ def write_report(path: str | Path, report: Report) -> Path:
     page = page_of(report)
     handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+        with os.fdopen(handle, "w", encoding="utf-8", errors="replace", newline="\n") as file:
             file.write(page)
         os.chmod(name, 0o644)
         os.replace(name, target)

@@ -26,7 +26,7 @@ def parameters_section(result: FitResult, identifiability: IdentifiabilityReport
             (
                 Cell(p.path, "name"),
                 Cell(with_error(value, error), "number"),
-                Cell(p.unit or "–"),
+                Cell(p.unit or "–", "unit"),
                 Cell(together(ends, error, "{} … {}") if known else "–", "number"),
                 _bar(result, i),
                 _verdict(result, i, identifiability),

@@ -22,7 +22,7 @@ def profiles_section(profiles: ProfileResult, result: FitResult) -> Section:
     rows = tuple(
         (
             Cell(p.path, "name"),
-            Cell(p.unit or "–"),
+            Cell(p.unit or "–", "unit"),
             *number_cells(plain(float(x)) for x in (p.estimate, *p.interval)),
             Cell(
                 " and ".join(side for side, is_open in zip(("below", "above"), p.open, strict=True) if is_open) or "–"

@@ -68,6 +68,8 @@ def _figures(one: Compared, speed: tuple[str, str, np.ndarray] | None) -> list[F
             partial(_spectrum, values, period, unit),
             f"Spectrum of the residual of {name}",
             f"{name}: spectrum. The line is white noise of the same deviation.",
+            wide=speed is None,
+            height=2.4 if speed is not None else 1.6,
         ),
     ]
     if speed is not None:

@@ -7,6 +7,8 @@ from fitting.report.colours import in_page_colour
 
 _COLOUR = re.compile(r"#[0-9a-f]{6}\b")
 _FONT = re.compile(r"font(-family)?:[^;]*;?\s*")
+# What XML cannot hold, and names from files may.
+_FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 _SIZE = re.compile(r"([0-9.]+)px")
 
 
@@ -18,7 +20,7 @@ def in_page(drawing: str, key: str, alt: str) -> str:
         key: beginning of all names inside it, so that drawings do not meet each other's.
         alt: what is to be seen.
     """
-    root = ElementTree.fromstring(drawing)
+    root = ElementTree.fromstring(_FORBIDDEN.sub("\ufffd", drawing))
     for node in root.iter():
         for child in [child for child in node if _plain(child.tag) in ("metadata", "style")]:
             node.remove(child)

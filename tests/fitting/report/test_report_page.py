@@ -1,6 +1,7 @@
 """The page of a report: well formed, without outside addresses, escaped, whole, and the same for the same input."""
 
 import re
+import warnings
 
 import numpy as np
 import pytest
@@ -87,6 +88,20 @@ def test_written_whole_or_not_at_all(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
     with pytest.raises(InputError, match="does not exist"):
         write_report(tmp_path / "none" / "report.html", small())
+
+
+def test_names_in_any_letters(tmp_path):
+    odd = "速度 \x07 $x_"
+
+    def names(axes):
+        axes[0].plot([0, 1], [0, 1])
+        axes[0].set_xlabel(odd)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        section = Section(odd, odd, figures=(Figure(names, odd),))
+        path = write_report(tmp_path / "odd.html", small(sections=(section,)))
+    assert "速度" in path.read_text(encoding="utf-8").split('class="picture"')[1]
 
 
 def test_rows_have_a_cell_for_each_head():

@@ -40,7 +40,9 @@ def make_records(folder: Path, *, seed: int = 1, preloads: tuple[float, ...] = P
     """
     folder.mkdir(parents=True, exist_ok=True)
     found = {}
-    for percent, one in zip(preloads, measure(preloads, sweep_reference(_DURATION), 1.0 + _DURATION, seed=seed), strict=True):
+    for percent, one in zip(
+        preloads, measure(preloads, sweep_reference(_DURATION), 1.0 + _DURATION, seed=seed), strict=True
+    ):
         name = f"sweep_{percent:g}"
         write_trajectory(folder / f"{name}.csv", one.record, units=_UNITS)
         found[name] = percent
@@ -60,7 +62,9 @@ def write_study(file: Path, sweeps: dict[str, float]) -> Path:
     for name in sweeps:
         channels = [f'{c} = {{ column = "{c}", unit = "{u}" }}' for c, u in _UNITS.items()]
         channels += [f'{c} = {{ column = "{c}", unit = "N m" }}' for c in ("torque_1", "torque_2")]
-        blocks.append("\n".join([f"[data.{name}]", f'file = "records/{name}.csv"', f"[data.{name}.channels]", *channels]))
+        blocks.append(
+            "\n".join([f"[data.{name}]", f'file = "records/{name}.csv"', f"[data.{name}.channels]", *channels])
+        )
     listed = ", ".join(f'{name} = "{percent:g} %"' for name, percent in sweeps.items())
     asked = (
         f'[identify]\nprocedure = "preloaded_drive"\npreloads = {{ {listed} }}\nsweep_start = "1 s"\n'

@@ -15,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Outcome:
     """Run the demo."""
-    from fitting.demo import run_demo
+    from fitting.rack_pinion_demo import run_demo
 
     folder = open_folder(options.out, force=options.force)
     text = run_demo(folder)

@@ -11,7 +11,6 @@ from twin._checks import InputError
 from twin.io.model_text import model_text
 from twin.io.toml_document import unknown
 
-
 _EXAMPLE = r"^\[data\.(\w+)\]\n(.*?)(?=\n\n)\n\n\[data\.\1\.channels\][^\n]*\n(.*?)(?=\n\n)"
 # What a look at a file calls a channel, and what the examples call it.
 _ALIASES = {"position_setpoint": "set", "current": "command", "voltage": "command", "torque": "command"}
@@ -59,9 +58,7 @@ def _with_channels(rest: str, data: Path) -> str:
     if not lines[0].startswith("[data."):
         raise InputError(f"{str(data)!r} has no channels over time. Look at it by: drivetwin look {data}")
     own = lines[0][len("[data.") : -1]
-    block = re.search(
-        r"^\[data\.(\w+)\]\n(.*?)(?=\n\n)\n\n\[data\.\1\.channels\][^\n]*\n(.*?)(?=\n\n)", rest, re.M | re.S
-    )
+    block = re.search(_EXAMPLE, rest, re.MULTILINE | re.DOTALL)
     if block is None:
         return rest + "\n" + "\n".join(lines) + "\n"
     there = data.resolve().as_posix()

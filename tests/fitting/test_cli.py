@@ -76,7 +76,7 @@ def test_interruptions_are_one_sentence(tmp_path, capsys, monkeypatch, error, co
     def interrupted(folder):
         raise error
 
-    monkeypatch.setattr("fitting.demo.run_demo", interrupted)
+    monkeypatch.setattr("fitting.rack_pinion_demo.run_demo", interrupted)
     assert main(["demo", "--out", str(tmp_path)]) == code
     assert capsys.readouterr().err.startswith(told)
 
@@ -95,13 +95,13 @@ def test_results_are_not_written_over_without_being_told(tmp_path, capsys, monke
         (folder / "plots" / "fit.png").write_text("")
         return "done"
 
-    monkeypatch.setattr("fitting.demo.run_demo", run)
+    monkeypatch.setattr("fitting.rack_pinion_demo.run_demo", run)
     out = tmp_path / "results"
     assert main(["demo", "--out", str(out)]) == 0
     assert main(["demo", "--out", str(out)]) == 2
     assert "--force" in capsys.readouterr().err
     (out / "mine.txt").write_text("mine")
-    monkeypatch.setattr("fitting.demo.run_demo", lambda folder: "done")
+    monkeypatch.setattr("fitting.rack_pinion_demo.run_demo", lambda folder: "done")
     assert main(["demo", "--out", str(out), "--force"]) == 0
     assert {path.name for path in out.rglob("*") if path.is_file()} == {".drivetwin.json", "mine.txt"}
 
@@ -117,9 +117,9 @@ def test_a_run_that_did_not_end_goes_on_in_its_folder(tmp_path, monkeypatch):
         (folder / "half").write_text("")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("fitting.demo.run_demo", stopped)
+    monkeypatch.setattr("fitting.rack_pinion_demo.run_demo", stopped)
     assert main(["demo", "--out", str(tmp_path)]) == 130
-    monkeypatch.setattr("fitting.demo.run_demo", lambda folder: "done")
+    monkeypatch.setattr("fitting.rack_pinion_demo.run_demo", lambda folder: "done")
     assert main(["demo", "--out", str(tmp_path)]) == 0
 
 

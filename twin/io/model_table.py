@@ -93,7 +93,7 @@ class _Builder:
             return self._of_table(key, self._with_likes(key, written), _kind(facts.type))
         if isinstance(written, list) and written and all(isinstance(one, dict) for one in written):
             return tuple(self._of_table((*key, i), one, _inner(facts.type)) for i, one in enumerate(written))
-        if facts.static or isinstance(written, bool):
+        if facts.static or facts.type is bool:
             return tuple(written) if isinstance(written, list) else written
         if isinstance(written, list):
             return np.asarray([self._quantity((*key, i), one, facts) for i, one in enumerate(written)])

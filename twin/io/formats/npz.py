@@ -102,7 +102,7 @@ def _sound(head, size: int, most: int, limit: int, file: Path, name: str, remark
             f"{str(file)!r} declares {math.prod(shape)} numbers in {name!r}, which its {size} bytes do not hold. It is "
             "damaged; copy or save it again."
         )
-    check_room(math.prod(shape) * 16, 2 * limit, file, f"array {name!r}")
+    check_room(math.prod(shape) * max(8, kind.itemsize), limit, file, f"array {name!r}")
     if kind.kind not in "biufc" or kind.names is not None:
         remarks.append(f"{name!r} holds no numbers and is left out.")
         return False

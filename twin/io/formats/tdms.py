@@ -2,6 +2,7 @@
 
 import contextlib
 import logging
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,13 @@ def matches(head: bytes) -> int:
 
 
 def read(
-    file: Path, limit: int, *, time: str | None = None, time_unit: str | None = None, rate: float | None = None
+    file: Path,
+    limit: int,
+    *,
+    time: str | None = None,
+    time_unit: str | None = None,
+    rate: float | None = None,
+    incomplete: str = "refuse",
 ) -> tuple[list[MeasuredChannel], list[str]]:
     """Read the channels of numbers of all groups; one group's channels are called by their name alone.
 
@@ -35,7 +42,10 @@ def read(
         time: name of the time channel; None takes the waveform's increment, or finds it in each group.
         time_unit: unit of the time channel; None takes the file's.
         rate: samples per second, where there is neither.
+        incomplete: "keep" reads what is there of a recording that broke off; "refuse" does not.
     """
+    if incomplete not in ("refuse", "keep"):
+        raise InputError(f"incomplete must be refuse or keep, but is {incomplete!r}.")
     from nptdms import TdmsFile
 
     remarks: list[str] = []
@@ -65,6 +75,14 @@ def read(
                 channels += with_abscissa(columns, file, remarks, time=time, time_unit=time_unit, rate=rate)
             else:
                 channels += with_abscissa(columns, file, remarks, rate=rate)
+    broken = [
+        told for told in remarks if told.startswith("npTDMS") and re.search("less data|incomplete|Cropping", told)
+    ]
+    if broken and incomplete == "refuse":
+        raise InputError(
+            f"TDMS file {str(file)!r} is cut short ({broken[0]}) Copy it again, or read what there is by the option "
+            "incomplete='keep'."
+        )
     return channels, remarks
 
 

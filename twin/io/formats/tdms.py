@@ -11,7 +11,7 @@ import numpy as np
 
 from twin._checks import InputError
 from twin.io.formats._abscissa import even_times, with_abscissa
-from twin.io.formats._shared import Column, as_column, check_count, check_room, printable
+from twin.io.formats._shared import Column, as_column, check_count, check_room, finite_number, printable
 from twin.io.measurement import MeasuredChannel
 
 ENDINGS = (".tdms",)
@@ -64,9 +64,9 @@ def read(
                     continue
                 unit = next((channel.properties[key] for key in _UNITS if key in channel.properties), "")
                 column = as_column(printable(name), values, unit)
-                increment = _number(channel.properties.get("wf_increment"))
+                increment = finite_number(channel.properties.get("wf_increment"))
                 if increment and increment > 0 and time is None:
-                    start = _number(channel.properties.get("wf_start_offset")) or 0.0
+                    start = finite_number(channel.properties.get("wf_start_offset")) or 0.0
                     times = even_times(values.size, increment, start)
                     channels.append(MeasuredChannel(column.name, column.values, column.unit, times, "time"))
                 else:
@@ -102,13 +102,6 @@ def _values(channel: Any, file: Path, limit: int) -> np.ndarray | None:
     if values.dtype.kind == "M":
         return (values - values[:1]).astype("timedelta64[ns]").astype(np.float64) * 1e-9
     return values if values.dtype.kind in "biufc" and values.size else None
-
-
-def _number(value: Any) -> float | None:
-    try:
-        return float(value) if np.isfinite(float(value)) else None
-    except (TypeError, ValueError):
-        return None
 
 
 class _Keeper(logging.Handler):

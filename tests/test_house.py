@@ -22,10 +22,11 @@ NOT_IN_CORE = {"matplotlib", "pandas", "SALib", "pooch", "tomlkit", "pint", "jso
 LIGHT = ("twin", "twin.simulation", "twin.drives", "twin.control", "twin.linear", "twin.parameters", "twin.references")
 LIGHT += ("twin.laws", "twin.modal", "twin.sweep", "twin.frf", "twin.frf_estimators", "twin.correlation")
 LIGHT += ("twin.structure", "twin.performance", "twin.record", "twin.plots", "twin.compile_cache", "twin.io.csv")
+LIGHT += ("twin.io.measurement", "twin.io.prepare", "twin.io.look", "twin.io.look_plots", "twin.io.sep005")
 LIGHT += ("sensitivity", "sensitivity.plots", "fitting.fit", "fitting.multistart", "fitting.profile", "fitting.plots")
 LIGHT += ("fitting.identifiability", "fitting.design", "fitting.posterior", "fitting.identification.output_error")
 LATE = {"matplotlib", "pandas", "SALib", "scipy", "interpax", "pint", "pooch", "platformdirs", "tomlkit", "pyuff"}
-LATE |= {"h5py", "blackjax", "requests"}
+LATE |= {"h5py", "nptdms", "blackjax", "requests"}
 
 
 def modules(path):

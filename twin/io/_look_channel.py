@@ -115,6 +115,8 @@ def _runs(same: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _clipping(values: np.ndarray, span: float) -> tuple[str, str] | None:
     slope = np.abs(np.diff(values))
     usual = float(np.median(slope[slope > 0]))
+    if np.count_nonzero(slope) < 0.02 * values.size or np.unique(values[:10_000]).size < 8:
+        return None  # a switch has no other values
     for end, told in ((values.max(), "largest"), (values.min(), "smallest")):
         starts, lengths = _runs(values == end)
         long = (lengths >= 3) & (starts > 0)
@@ -175,6 +177,8 @@ def _drift(values: np.ndarray, channel: MeasuredChannel) -> tuple[str, str] | No
     scatter = float(np.std(values - slope * count))
     if abs(slope) < 2 * scatter:
         return None
+    if abs(slope) > 1000 * scatter:
+        return "counter", f"runs evenly from {values[0]:.6g} to {values[-1]:.6g}: a counter?"
     return "drift", f"drifts by {slope:.4g} over the record, {abs(slope) / max(scatter, 1e-300):.1f} times its scatter."
 
 

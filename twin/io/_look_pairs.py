@@ -61,6 +61,8 @@ def _derivative(position: MeasuredChannel, speed: MeasuredChannel) -> Finding | 
     width = max(3, x.size // 500)
     a, b = (np.convolve(y, np.hanning(width + 2)[1:-1], "same") for y in (slope, v))
     a, b = a - a.mean(), b - b.mean()
+    if a @ a < 1e-12 * (slope @ slope):  # a straight line says nothing
+        return None
     most = max(1, min(int(_LARGEST_LAG * position.rate), x.size // 10))
     lags, correlation, ratios = _correlation(a, b, most)
     best = int(np.argmax(np.abs(correlation)))

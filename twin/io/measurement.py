@@ -157,9 +157,10 @@ def read_measurement(
         except OSError as error:
             raise InputError(f"{str(file)!r} cannot be read: {error}. Copy it again and check its rights.") from error
         except Exception as error:  # libraries raise nearly anything on a damaged file
+            told = " ".join(str(error).split())[:200]
             raise InputError(
                 f"{str(file)!r} cannot be read as {format or 'what it seems to be'} ({type(error).__name__}: "
-                f"{str(error)[:200]}). It is damaged or of another format; export it again, or name the format."
+                f"{told}). It is damaged or of another format; export it again, or name the format."
             ) from error
     if not channels:
         raise InputError(f"{str(file)!r} ({name}) holds no channel of numbers. {' '.join(remarks)} Export it again.")

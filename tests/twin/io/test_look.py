@@ -64,6 +64,11 @@ def test_resolution_and_drift():
     assert ("i", "drift") in kinds(("i", 5 * T + np.sin(5 * T), "A"))
 
 
+def test_counters_and_switches():
+    assert kinds(("count", np.arange(4000.0), "")) == {("count", "counter")}
+    assert not kinds(("on", (np.arange(4000) % 400 > 200).astype(float), "")) - {("on", "drift")}
+
+
 def test_units_that_are_unlikely():
     assert "is it in mm" in texts(("x_ist", 1e3 * POSITION, ""))
     assert "is it in 1/min" in texts(("n_ist", 3000 * np.sin(T), "rad/s"))

@@ -73,6 +73,14 @@ def test_time_by_option_and_missing_time(tmp_path):
     assert read_measurement(path, rate=50.0)["x"].rate == pytest.approx(50.0)
 
 
+def test_time_in_microseconds_is_seen_by_the_rate(tmp_path):
+    path = tmp_path / "run.mat"
+    scipy.io.savemat(path, {"time": 1e6 * made.TIMES, "x": made.POSITION, "fs": 100.0})
+    found = read_measurement(path)
+    np.testing.assert_allclose(found["x"].times, made.TIMES, atol=1e-12)
+    assert any("µs" in remark for remark in found.remarks)
+
+
 def test_mat_structs_of_simulink_and_recorders(tmp_path):
     path = tmp_path / "run.mat"
     signals = np.array(

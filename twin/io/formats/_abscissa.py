@@ -12,7 +12,7 @@ from twin.io.units import to_si
 
 _TIMES = ("time", "t", "zeit", "times", "timestamp", "zeitstempel", "time stamp", "tout", "zeitachse", "x-achse", "sec")
 _FREQUENCIES = ("frequency", "freq", "f", "frequenz", "frequencies", "freqs")
-_EVEN = 1e-3
+_EVEN, _NEAR = 1e-3, 1e-2
 
 
 def with_abscissa(
@@ -48,6 +48,8 @@ def with_abscissa(
     if found is None:
         return _counted(columns, rate, remarks)
     axis = _axis(found, kind, time_unit, file, remarks)
+    if rate is not None and kind == "time" and time_unit is None and not found.unit:
+        axis = _suited(axis, rate, found.name, remarks)
     channels = []
     for column in columns:
         if column is found:
@@ -121,6 +123,18 @@ def _axis(found: Column, kind: str, time_unit: str | None, file: Path, remarks: 
     if unit == basic:
         return found.values
     return to_si(found.values, unit, basic, name=f"{kind} column {found.name!r} of {str(file)!r}")
+
+
+def _suited(axis: np.ndarray, rate: float, name: str, remarks: list[str]) -> np.ndarray:
+    """Times without unit in s, where their steps suit the sample rate in ms, µs or ns only."""
+    step = float(np.median(np.diff(axis))) if axis.size > 1 else 0.0
+    for unit, factor in (("ms", 1e3), ("µs", 1e6), ("ns", 1e9)):
+        if abs(step * rate / factor - 1) < _NEAR:
+            remarks.append(
+                f"The steps of {name!r} suit the sample rate of {rate:g} Hz only in {unit}, so it is in {unit}."
+            )
+            return axis / factor
+    return axis
 
 
 def _of_dimension(unit: str, basic: str) -> bool:

@@ -44,8 +44,8 @@ def clock_seconds(cells: Any, name: str, file: Path) -> tuple[np.ndarray, str]:
             seconds = (moments - first).dt.total_seconds().to_numpy(dtype=np.float64, na_value=np.nan)
     except (ValueError, TypeError, OverflowError) as error:
         raise InputError(
-            f"{str(file)!r} has a cell in column {name!r} that is no time like the first, {started!r}: {error}. Repair "
-            "it, or name another time column."
+            f"{str(file)!r} has a cell in column {name!r} that is no time like the first, {started!r}. Repair it, "
+            "or name another time column."
         ) from error
     return seconds - seconds[np.flatnonzero(np.isfinite(seconds))[0]], started
 

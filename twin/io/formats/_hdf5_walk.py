@@ -119,7 +119,12 @@ class SafeHdf5:
         """
         known = {str(name).lower(): name for name in owner.attrs}
         for name in names:
-            if name in known and owner.attrs.get_id(known[name]).get_storage_size() <= 65536:
+            if name in known and self._is_small(owner.attrs.get_id(known[name])):
                 value = owner.attrs[known[name]]
                 return value.reshape(-1)[0] if isinstance(value, np.ndarray) and value.size == 1 else value
         return None
+
+    def _is_small(self, attribute: Any) -> bool:
+        """Whether an attribute takes no more than 64 KiB, as it declares and as it is stored."""
+        declared = int(np.prod(attribute.shape)) * max(attribute.dtype.itemsize, 1)
+        return max(declared, attribute.get_storage_size()) <= 65536

@@ -9,7 +9,7 @@ import numpy as np
 from twin._checks import InputError
 
 _LONGEST_NAME = 200
-_MOST_COLUMNS = 20_000
+_MOST_COLUMNS, _WIDEST = 20_000, 64
 # Symbols that stand for units in headings; pint would take nearly any letter for one.
 _SYMBOLS = frozenset(
     (
@@ -43,6 +43,43 @@ def as_column(name: str, values: Any, unit: Any = "") -> Column:
     array = np.asarray(values).ravel()
     array = array.astype(np.complex128 if array.dtype.kind == "c" else np.float64)
     return Column(printable(name), array, printable(unit))
+
+
+def columns_of(
+    name: str, values: np.ndarray, unit: Any, remarks: list[str], numbered: str = "{}[{}]", first: int = 0
+) -> list[Column]:
+    """The columns of an array: itself if it is a vector, else those along its shorter side.
+
+    Args:
+        name: its name in the file.
+        values: real or complex numbers of any shape.
+        unit: its unit in the file.
+        remarks: what is left out is added here.
+        numbered: how a column of a matrix is called, from name and number.
+        first: number of the first column.
+    """
+    name = printable(name)
+    if values.ndim < 2 or max(values.shape) == values.size:
+        return [as_column(name, values, unit)]
+    table = values.reshape(values.shape[0], -1)
+    table = table.T if table.shape[0] < table.shape[1] else table
+    if table.shape[1] > _WIDEST:
+        remarks.append(f"{name!r} has {table.shape[1]} columns and is left out.")
+        return []
+    return [as_column(numbered.format(name, first + i), table[:, i], unit) for i in range(table.shape[1])]
+
+
+def finite_number(value: Any) -> float | None:
+    """A number of a file's properties; None where it is none.
+
+    Args:
+        value: anything.
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        return None
+    return number if np.isfinite(number) else None
 
 
 def printable(text: Any) -> str:

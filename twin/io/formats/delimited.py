@@ -68,10 +68,11 @@ def read(
     Raises:
         InputError: no text, no table of numbers, or a cell that is no number, with its line.
     """
-    check_room(4 * file.stat().st_size, 4 * limit, file, "text")
+    check_room(file.stat().st_size, limit, file, "text")
     _check_options(delimiter, decimal, header_line, first_data_line)
     encoding = encoding or _encoding(file)
     lines = list(itertools.islice(_lines(file, encoding), _SNIFFED_LINES))
+    check_count(max((len(line.split(mark)) for line in lines[:20] for mark in "\t;,| "), default=0), file)
     told = dict(delimiter=delimiter, decimal=decimal, thousands=thousands)
     layout = sniff(lines, **told, header_line=header_line, first_data_line=first_data_line)
     if layout is None or "number" not in layout.kinds:
@@ -79,7 +80,6 @@ def read(
             f"{str(file)!r} has no table of numbers in its first {len(lines)} lines. Name delimiter, decimal and "
             "first_data_line, or export it again."
         )
-    check_count(layout.width, file)
     remarks = [
         f"Text in {encoding}, delimiter {'blanks' if layout.delimiter == BLANKS else repr(layout.delimiter)}, decimal "
         f"{layout.decimal!r}{f', thousands {layout.thousands!r}' if layout.thousands else ''}, samples from line "

@@ -8,11 +8,10 @@ import numpy as np
 from twin.io.formats._abscissa import even_times, with_abscissa
 from twin.io.formats._hdf5_walk import SafeHdf5
 from twin.io.formats._mat_tree import HDF5_MARK
-from twin.io.formats._shared import Column, as_column, check_count, printable
+from twin.io.formats._shared import Column, check_count, columns_of, finite_number, printable
 from twin.io.measurement import MeasuredChannel
 
 ENDINGS = (".h5", ".hdf5", ".hdf", ".he5", ".nxs")
-_MOST_COLUMNS = 64
 
 
 def matches(head: bytes) -> int:
@@ -51,8 +50,8 @@ def read(
                 continue
             unit = opened.attribute(dataset, "unit", "units", "unit_string", "einheit") or ""
             period = _period(opened, dataset) or _period(opened, dataset.parent)
-            start = _number(opened.attribute(dataset, "t0", "start", "wf_start_offset")) or 0.0
-            for column in _columns(path, values, unit, remarks):
+            start = finite_number(opened.attribute(dataset, "t0", "start", "wf_start_offset")) or 0.0
+            for column in columns_of(path, values, unit, remarks):
                 if period and path != time:
                     times = even_times(column.values.size, period, start)
                     channels.append(MeasuredChannel(column.name, column.values, column.unit, times, "time"))
@@ -70,28 +69,8 @@ def read(
     return channels, remarks
 
 
-def _columns(path: str, values: np.ndarray, unit: Any, remarks: list[str]) -> list[Column]:
-    if values.ndim < 2 or max(values.shape) == values.size:
-        return [as_column(path, values, unit)]
-    values = values.reshape(values.shape[0], -1)
-    if values.shape[0] < values.shape[1]:
-        values = values.T
-    if values.shape[1] > _MOST_COLUMNS:
-        remarks.append(f"{path!r} has {values.shape[1]} columns and is left out.")
-        return []
-    return [as_column(f"{path}[{number}]", values[:, number], unit) for number in range(values.shape[1])]
-
-
 def _period(opened: SafeHdf5, owner: Any) -> float | None:
-    rate = _number(opened.attribute(owner, "sample_rate", "samplerate", "sampling_rate", "fs"))
-    period = _number(opened.attribute(owner, "dt", "wf_increment", "sample_period"))
+    rate = finite_number(opened.attribute(owner, "sample_rate", "samplerate", "sampling_rate", "fs"))
+    period = finite_number(opened.attribute(owner, "dt", "wf_increment", "sample_period"))
     period = 1 / rate if rate else period
     return period if period and period > 0 and np.isfinite(period) else None
-
-
-def _number(value: Any) -> float | None:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        return None
-    return number if np.isfinite(number) else None

@@ -1,7 +1,6 @@
 """MAT-files of all versions: plain vectors, structs, and the layouts of Simulink and of recorders."""
 
 import struct
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +8,11 @@ import numpy as np
 
 from twin.io.formats._abscissa import even_times, with_abscissa
 from twin.io.formats._mat_tree import mat_tree
-from twin.io.formats._shared import Column, as_column, check_count, printable
+from twin.io.formats._shared import Column, as_column, check_count, columns_of, printable
 from twin.io.measurement import MeasuredChannel
 
 ENDINGS = (".mat",)
 _TIMES = ("time", "t", "Time")
-_MOST_COLUMNS = 64
 
 
 def matches(head: bytes) -> int:
@@ -83,20 +81,8 @@ def _gather(name: str, value: Any, channels: list[MeasuredChannel], columns: lis
                 _gather(f"{name}({number})", one, channels, columns, remarks)
 
 
-def _vectors(name: str, value: np.ndarray, remarks: list[str]) -> Iterator[Column]:
-    if value.size == 0:
-        return
-    if value.ndim < 2 or (1 in value.shape and value.ndim == 2):
-        yield as_column(printable(name), value)
-        return
-    value = value.reshape(value.shape[0], -1)
-    if value.shape[0] < value.shape[1]:
-        value = value.T
-    if value.shape[1] > _MOST_COLUMNS:
-        remarks.append(f"{printable(name)!r} is a matrix of {value.shape[1]} columns and is left out.")
-        return
-    for number in range(value.shape[1]):
-        yield as_column(f"{printable(name)}({number + 1})", value[:, number])
+def _vectors(name: str, value: np.ndarray, remarks: list[str]) -> list[Column]:
+    return columns_of(name, value, "", remarks, "{}({})", 1) if value.size else []
 
 
 def _rate_among(single: list[Column], remarks: list[str]) -> float | None:

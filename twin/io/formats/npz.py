@@ -9,12 +9,12 @@ import numpy as np
 
 from twin._checks import InputError
 from twin.io.formats._abscissa import with_abscissa
-from twin.io.formats._shared import Column, as_column, check_count, check_room, printable
+from twin.io.formats._shared import Column, check_count, check_room, columns_of, printable
 from twin.io.measurement import MeasuredChannel
 
 ENDINGS = (".npz", ".npy")
 _HEADER = 20_000
-_MOST_MEMBERS, _MOST_COLUMNS = 10_000, 64
+_MOST_MEMBERS = 10_000
 
 
 def matches(head: bytes) -> int:
@@ -39,15 +39,7 @@ def read(
     remarks: list[str] = []
     columns: list[Column] = []
     for name, array in _arrays(file, limit, remarks):
-        if array.ndim <= 1 or max(array.shape) == array.size:
-            columns.append(as_column(name, array))
-            continue
-        table = array.reshape(array.shape[0], -1)
-        table = table.T if table.shape[0] < table.shape[1] else table
-        if table.shape[1] > _MOST_COLUMNS:
-            remarks.append(f"{name!r} has {table.shape[1]} columns and is left out.")
-            continue
-        columns += [as_column(f"{name}[{number}]", table[:, number]) for number in range(table.shape[1])]
+        columns += columns_of(name, array, "", remarks)
     check_count(len(columns), file)
     single = {column.name.lower(): float(column.values[0].real) for column in columns if column.values.size == 1}
     for name in ("fs", "rate", "sample_rate"):
@@ -102,7 +94,7 @@ def _sound(head, size: int, most: int, limit: int, file: Path, name: str, remark
             f"{str(file)!r} declares {math.prod(shape)} numbers in {name!r}, which its {size} bytes do not hold. It is "
             "damaged; copy or save it again."
         )
-    check_room(math.prod(shape) * 16, 2 * limit, file, f"array {name!r}")
+    check_room(math.prod(shape) * max(8, kind.itemsize), limit, file, f"array {name!r}")
     if kind.kind not in "biufc" or kind.names is not None:
         remarks.append(f"{name!r} holds no numbers and is left out.")
         return False

@@ -2,6 +2,7 @@
 
 import contextlib
 import logging
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 
 from twin._checks import InputError
 from twin.io.formats._abscissa import even_times, with_abscissa
-from twin.io.formats._shared import Column, as_column, check_count, check_room, printable
+from twin.io.formats._shared import Column, as_column, check_count, check_room, finite_number, printable
 from twin.io.measurement import MeasuredChannel
 
 ENDINGS = (".tdms",)
@@ -25,7 +26,13 @@ def matches(head: bytes) -> int:
 
 
 def read(
-    file: Path, limit: int, *, time: str | None = None, time_unit: str | None = None, rate: float | None = None
+    file: Path,
+    limit: int,
+    *,
+    time: str | None = None,
+    time_unit: str | None = None,
+    rate: float | None = None,
+    incomplete: str = "refuse",
 ) -> tuple[list[MeasuredChannel], list[str]]:
     """Read the channels of numbers of all groups; one group's channels are called by their name alone.
 
@@ -35,7 +42,10 @@ def read(
         time: name of the time channel; None takes the waveform's increment, or finds it in each group.
         time_unit: unit of the time channel; None takes the file's.
         rate: samples per second, where there is neither.
+        incomplete: "keep" reads what is there of a recording that broke off; "refuse" does not.
     """
+    if incomplete not in ("refuse", "keep"):
+        raise InputError(f"incomplete must be refuse or keep, but is {incomplete!r}.")
     from nptdms import TdmsFile
 
     remarks: list[str] = []
@@ -54,9 +64,9 @@ def read(
                     continue
                 unit = next((channel.properties[key] for key in _UNITS if key in channel.properties), "")
                 column = as_column(printable(name), values, unit)
-                increment = _number(channel.properties.get("wf_increment"))
+                increment = finite_number(channel.properties.get("wf_increment"))
                 if increment and increment > 0 and time is None:
-                    start = _number(channel.properties.get("wf_start_offset")) or 0.0
+                    start = finite_number(channel.properties.get("wf_start_offset")) or 0.0
                     times = even_times(values.size, increment, start)
                     channels.append(MeasuredChannel(column.name, column.values, column.unit, times, "time"))
                 else:
@@ -65,6 +75,14 @@ def read(
                 channels += with_abscissa(columns, file, remarks, time=time, time_unit=time_unit, rate=rate)
             else:
                 channels += with_abscissa(columns, file, remarks, rate=rate)
+    broken = [
+        told for told in remarks if told.startswith("npTDMS") and re.search("less data|incomplete|Cropping", told)
+    ]
+    if broken and incomplete == "refuse":
+        raise InputError(
+            f"TDMS file {str(file)!r} is cut short ({broken[0]}) Copy it again, or read what there is by the option "
+            "incomplete='keep'."
+        )
     return channels, remarks
 
 
@@ -84,13 +102,6 @@ def _values(channel: Any, file: Path, limit: int) -> np.ndarray | None:
     if values.dtype.kind == "M":
         return (values - values[:1]).astype("timedelta64[ns]").astype(np.float64) * 1e-9
     return values if values.dtype.kind in "biufc" and values.size else None
-
-
-def _number(value: Any) -> float | None:
-    try:
-        return float(value) if np.isfinite(float(value)) else None
-    except (TypeError, ValueError):
-        return None
 
 
 class _Keeper(logging.Handler):

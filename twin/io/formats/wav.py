@@ -40,7 +40,7 @@ def read(
     import scipy.io.wavfile  # a quarter of a second to import
 
     _check_chunks(file)
-    check_room(file.stat().st_size * 8, limit * 8, file, "samples")
+    check_room(file.stat().st_size, limit, file, "samples")
     rate, samples = scipy.io.wavfile.read(file)
     if rate <= 0 or samples.size == 0:
         raise InputError(f"WAV file {str(file)!r} has {samples.size} samples at {rate} Hz. Export it again.")

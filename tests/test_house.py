@@ -23,9 +23,10 @@ LIGHT = ("twin", "twin.simulation", "twin.drives", "twin.control", "twin.linear"
 LIGHT += ("twin.laws", "twin.modal", "twin.sweep", "twin.frf", "twin.frf_estimators", "twin.correlation")
 LIGHT += ("twin.structure", "twin.performance", "twin.record", "twin.plots", "twin.compile_cache", "twin.io.csv")
 LIGHT += ("sensitivity", "sensitivity.plots", "fitting.fit", "fitting.multistart", "fitting.profile", "fitting.plots")
+LIGHT += ("twin.export",)
 LIGHT += ("fitting.identifiability", "fitting.design", "fitting.posterior", "fitting.identification.output_error")
 LATE = {"matplotlib", "pandas", "SALib", "scipy", "interpax", "pint", "pooch", "platformdirs", "tomlkit", "pyuff"}
-LATE |= {"h5py", "blackjax", "requests"}
+LATE |= {"h5py", "blackjax", "requests", "control", "fmpy", "flatbuffers"}
 
 
 def modules(path):

@@ -26,7 +26,7 @@ LIGHT += ("sensitivity", "sensitivity.plots", "fitting.fit", "fitting.multistart
 LIGHT += ("twin.export",)
 LIGHT += ("fitting.identifiability", "fitting.design", "fitting.posterior", "fitting.identification.output_error")
 LATE = {"matplotlib", "pandas", "SALib", "scipy", "interpax", "pint", "pooch", "platformdirs", "tomlkit", "pyuff"}
-LATE |= {"h5py", "blackjax", "requests", "control", "fmpy", "flatbuffers"}
+LATE |= {"h5py", "blackjax", "requests", "control", "fmpy"}
 
 
 def modules(path):

@@ -1,5 +1,6 @@
 """The systems that tests of compiled exports write: with reference, times, inputs by name, and stepping."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from rack_pinion_systems import gains
@@ -113,3 +114,10 @@ CASES = {
     "servo_loop": lambda: loop_case(servo_loop(), 0.02),
     "preload_loop": lambda: loop_case(preload_loop(), 0.01),
 }
+
+
+def worst(rows, outputs):
+    """Largest error of each output, relative to its largest magnitude."""
+    expected = np.stack([np.asarray(x) for x in jax.tree.leaves(outputs)], axis=1)
+    peak = np.max(np.abs(expected), axis=0)
+    return float(np.max(np.abs(rows - expected) / np.where(peak == 0, 1.0, peak)))

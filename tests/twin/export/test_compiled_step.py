@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip("flatbuffers")
 
-from export_cases import CASES
+from export_cases import CASES, worst
 from reference_systems import two_mass
 
 from twin._checks import InputError
@@ -37,12 +37,6 @@ def rows_of(step, inputs, **options):
     zeros = np.zeros(count)
     items = jnp.asarray(np.stack([given.get(name, zeros) for name in step.inputs], axis=1))
     return np.asarray(jax.lax.scan(lambda x, u: step(x, u, **options), step.initial_state, items)[1])
-
-
-def worst(rows, outputs):
-    expected = np.stack([np.asarray(x) for x in jax.tree.leaves(outputs)], axis=1)
-    peak = np.max(np.abs(expected), axis=0)
-    return float(np.max(np.abs(rows - expected) / np.where(peak == 0, 1.0, peak)))
 
 
 @pytest.mark.parametrize("case", ["two_mass", "servo_loop", "preload_loop"])

@@ -24,9 +24,14 @@ LIGHT += ("twin.laws", "twin.modal", "twin.sweep", "twin.frf", "twin.frf_estimat
 LIGHT += ("twin.structure", "twin.performance", "twin.record", "twin.plots", "twin.compile_cache", "twin.io.csv")
 LIGHT += ("twin.io.measurement", "twin.io.prepare", "twin.io.look", "twin.io.look_plots", "twin.io.sep005")
 LIGHT += ("sensitivity", "sensitivity.plots", "fitting.fit", "fitting.multistart", "fitting.profile", "fitting.plots")
+LIGHT += ("twin.export",)
 LIGHT += ("fitting.identifiability", "fitting.design", "fitting.posterior", "fitting.identification.output_error")
 LATE = {"matplotlib", "pandas", "SALib", "scipy", "interpax", "pint", "pooch", "platformdirs", "tomlkit", "pyuff"}
+<<<<<<< HEAD
 LATE |= {"h5py", "nptdms", "blackjax", "requests"}
+=======
+LATE |= {"h5py", "blackjax", "requests", "control", "fmpy"}
+>>>>>>> f2688ecee190bef069509c322278b6671e3a8467
 
 
 def modules(path):

@@ -1,5 +1,8 @@
 """What leaves the twin: linear systems, measured data files, compiled steps and FMUs for other tools."""
 
+from twin.export.compiled_step import CompiledStep as CompiledStep
+from twin.export.compiled_step import export_step as export_step
+from twin.export.compiled_step import load_step as load_step
 from twin.export.fmu import write_fmu as write_fmu
 from twin.export.frf_csv import write_frf_csv as write_frf_csv
 from twin.export.frf_uff import write_frf_uff as write_frf_uff

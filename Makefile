@@ -26,7 +26,7 @@ types: $(STAMP)
 	$(BIN)/pyright
 
 notebooks: $(STAMP)
-	$(BIN)/python -m pytest -q tests/notebooks
+	DRIVETWIN_FAST=0 $(BIN)/python -m pytest -q tests/notebooks
 
 $(STAMP): requirements.lock pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)

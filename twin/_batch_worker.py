@@ -1,9 +1,13 @@
 """What a worker of an executor does with a chunk. A worker keeps the programs that it has compiled."""
 
+import dataclasses
 import functools
 import pickle
+import types
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import numpy as np
 
@@ -66,10 +70,17 @@ def packed_job(fn: Any, mode: str) -> bytes:
     """A function as bytes for workers that were started anew; also one of a notebook.
 
     Raises:
-        InputError: a function that cannot be sent.
+        InputError: a function that cannot be sent, or a module of a class that is defined in the script or notebook.
     """
     import cloudpickle
 
+    for module in _modules_in(fn):
+        # A class sent by value is made before its fields are known, and JAX would find no arrays in it.
+        if type(module).__module__ == "__main__" or "<locals>" in type(module).__qualname__:
+            raise InputError(
+                f"The class {type(module).__name__} cannot be sent to workers, as it is defined in the script, the "
+                "notebook or a function. Put it in a file that they can import; plain functions may stay."
+            )
     try:
         return cloudpickle.dumps((fn, mode, versions()))
     except Exception as error:
@@ -77,6 +88,32 @@ def packed_job(fn: Any, mode: str) -> bytes:
             f"The function cannot be sent to workers ({type(error).__name__}: {error}). Give a plain function or a "
             "module of arrays, without open files, locks or compiled functions inside."
         ) from error
+
+
+def _modules_in(value: Any, seen: set[int] | None = None) -> Iterator[eqx.Module]:
+    """Modules that go with a function: in its arguments, fields and closure, in the globals of a script's function."""
+    seen = set() if seen is None else seen
+    if id(value) in seen:
+        return
+    seen.add(id(value))
+    inside: Iterable[Any] = ()
+    if isinstance(value, eqx.Module):
+        yield value
+        inside = [getattr(value, field.name, None) for field in dataclasses.fields(value)]
+    elif isinstance(value, functools.partial):
+        inside = [value.func, *value.args, *value.keywords.values()]
+    elif isinstance(value, dict):
+        inside = value.values()
+    elif isinstance(value, list | tuple):
+        inside = value
+    elif isinstance(value, types.MethodType):
+        inside = (value.__self__,)
+    elif isinstance(value, types.FunctionType):
+        inside = [cell.cell_contents for cell in value.__closure__ or () if cell != types.CellType()]
+        if value.__module__ == "__main__":
+            inside += [value.__globals__[name] for name in value.__code__.co_names if name in value.__globals__]
+    for one in inside:
+        yield from _modules_in(one, seen)
 
 
 @functools.lru_cache(maxsize=8)

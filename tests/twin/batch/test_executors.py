@@ -8,9 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import batch_functions as functions
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jaxtyping import Array
 
 from twin import _batch_worker
 from twin._batch_worker import compute_remotely, packed_job
@@ -106,6 +109,36 @@ def test_a_function_that_the_worker_cannot_read_is_named():
     found = compute_remotely(b"no function", np.ones((1, 3)), np.ones(1, bool), 1)
     assert isinstance(found.error, InputError)
     assert "A worker cannot read the function" in str(found.error)
+
+
+class Law(eqx.Module):
+    slope: Array
+
+    def __call__(self, x):
+        return self.slope * x
+
+
+def test_a_class_that_workers_cannot_make_again_is_named():
+    class Local(eqx.Module):
+        law: Law
+
+        def __call__(self, x):
+            return self.law(x)
+
+    law = Law(jnp.ones(()))
+    assert packed_job(law, "vmap")
+    for fn in (Local(law), jax.tree_util.Partial(jnp.multiply, {"a": (Local(law),)}), Local(law).__call__):
+        with pytest.raises(InputError, match="class Local cannot be sent to workers"):
+            packed_job(fn, "vmap")
+
+    def closed(x):
+        return closed if x is None else local(x)
+
+    local = law
+    assert packed_job(closed, "vmap")
+    local = Local(law)
+    with pytest.raises(InputError, match="Put it in a file"):
+        packed_job(closed, "vmap")
 
 
 def test_threads_of_the_caller_run_lapack_one_at_a_time():

@@ -54,6 +54,8 @@ def type_named(name: str, kind: Any = None) -> Callable[..., Any]:
         InputError: an unknown name, or one of another kind; the message lists those there are.
     """
     fitting = types_of(kind)
+    if name in fitting:
+        return fitting[name]
     for known, one in fitting.items():
         if _plain(known) == _plain(name):
             return one

@@ -27,11 +27,7 @@ LIGHT += ("sensitivity", "sensitivity.plots", "fitting.fit", "fitting.multistart
 LIGHT += ("twin.export",)
 LIGHT += ("fitting.identifiability", "fitting.design", "fitting.posterior", "fitting.identification.output_error")
 LATE = {"matplotlib", "pandas", "SALib", "scipy", "interpax", "pint", "pooch", "platformdirs", "tomlkit", "pyuff"}
-<<<<<<< HEAD
-LATE |= {"h5py", "nptdms", "blackjax", "requests"}
-=======
-LATE |= {"h5py", "blackjax", "requests", "control", "fmpy"}
->>>>>>> f2688ecee190bef069509c322278b6671e3a8467
+LATE |= {"h5py", "nptdms", "blackjax", "requests", "control", "fmpy"}
 
 
 def modules(path):

@@ -51,7 +51,7 @@ def test_free_parameters(tmp_path):
         ('["80 kg", "5000 g"]', '["80 kg"]', 12, "mean and a standard deviation"),
         ('["80 kg", "5000 g"]', '["80 kg", "-5 kg"]', 12, "positive standard deviation"),
         ('"friction.coulomb" =', '"friction.coulom" =', 13, "Did you mean 'friction.coulomb'"),
-        ('"friction.coulomb" = { lower = "0 N", upper = "0.2 kN" }', '"friction.coulomb" = 3', 13, "must be a table such as"),
+        ('"friction.coulomb" = { lower = "0 N", upper = "0.2 kN" }', '"friction.coulomb" = 3', 13, "must be a table"),
         ('"friction.coulomb" =', '"friction" =', None, "Cannot mutate"),
         ('upper = "0.2 kN" }', 'upper = "0.2 kN", tied = ["mass"] }', None, "twice"),
     ],

@@ -11,7 +11,8 @@ Models: `drives` (one plant each), `laws` (friction, stiffness, backlash), `cont
 `references` (what a loop is told to do), `structure` (machines from component models).
 What they do: `simulate`, `linearise`, `frequency_response`, `modes`; `performance`, `correlation`, `modal`.
 Their numbers: `Parameter`, `ParameterSpace`, `set_leaves`. What if: `sweep`, `batched`, `executors`.
-Measured data: `Record`, `read_csv`, `io`. Pictures: `plots`. Faster starts: `compile_cache`.
+Measured data: `Record`, `read_measurement`, `prepare`, `read_csv`, `io`. Pictures: `plots`.
+Faster starts: `compile_cache`.
 
 Units are SI, frequencies Hz, angles rad. A name is loaded when it is first used, so that `import twin` costs nothing.
 `fitting` goes from data to parameters, `sensitivity` says which parameters matter.
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     from twin import structure as structure
     from twin.batch import batched as batched
     from twin.io.csv import read_csv as read_csv
+    from twin.io.measurement import read_measurement as read_measurement
+    from twin.io.prepare import prepare as prepare
     from twin.linear import frequency_response as frequency_response
     from twin.linear import linearise as linearise
     from twin.modal import modes as modes
@@ -59,6 +62,8 @@ load_lazily(
         "Parameter": "twin.parameters",
         "ParameterSpace": "twin.parameters",
         "Record": "twin.record",
+        "read_measurement": "twin.io.measurement",
+        "prepare": "twin.io.prepare",
         "read_csv": "twin.io.csv",
     },
     modules=(

@@ -28,7 +28,7 @@ from twin.frf import FRF
 from twin.parameters import ParameterSpace
 
 # How far from the start other starts are drawn, as factors.
-_AWAY = 20.0
+_AWAY = 5.0
 
 
 class TableResponse(NamedTuple):
@@ -88,7 +88,7 @@ def identify_preloaded_drive(
         held: names of sweeps that are predicted instead of fitted.
         band: frequencies that are used [Hz].
         leave_out_up_to: preloads up to this one are left out, as backlash distorts them [%].
-        starts: number of starts; from 2 on, these are drawn within a factor of 20 about what the chain found.
+        starts: number of starts; from 2 on, these are drawn within a factor of 5 about what the chain found.
         seed: of the starts and of the shuffling.
 
     Raises:

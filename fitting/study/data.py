@@ -10,7 +10,7 @@ set = { column = "x_soll", unit = "mm" }
 """
 
 import dataclasses
-from typing import Any
+from typing import Any, cast
 
 import jax
 import jax.numpy as jnp
@@ -132,7 +132,7 @@ def _measured(table: TomlTable, name: str) -> tuple[Record, list[str]]:
             sign=one.quantity("sign", 1, units=("1",)).value,
             offset=one.quantity("offset").value if "offset" in one else 0.0,
             delay=one.quantity("delay", "0 s", units=("s",)).value,
-            detrend=one.text("detrend", "none", choices=("none", "mean", "linear")),
+            detrend=cast(Any, one.text("detrend", "none", choices=("none", "mean", "linear"))),
             scale=one.quantity("scale").value if "scale" in one else None,
         )
     if not choices:
@@ -150,7 +150,7 @@ def _measured(table: TomlTable, name: str) -> tuple[Record, list[str]]:
             measurement,
             choices,
             time=table.text("time") if "time" in table else None,
-            gaps=table.text("gaps", "refuse", choices=("refuse", "fill", "longest")),
+            gaps=cast(Any, table.text("gaps", "refuse", choices=("refuse", "fill", "longest"))),
             name=name,
             **limits,
         )

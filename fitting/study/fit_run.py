@@ -31,6 +31,7 @@ from fitting.study.evidence import (
     status_of,
 )
 from fitting.study.fit_report import write_fit_report
+from fitting.study.shown import shown
 from fitting.study.study_file import StudyFile
 from fitting.study.written import write_fitted, write_run
 from twin._checks import InputError
@@ -235,7 +236,7 @@ def summary_of(found: FitRun) -> dict[str, Any]:
 
 def _text(study: StudyFile, found: FitRun, summary: dict[str, Any], report: Path) -> str:
     table = found.result.to_dataframe()[["unit", "estimate", "standard error", "95 % from", "95 % to", "remark"]]
-    lines = [study.title, table.to_string(float_format=lambda x: f"{x:.5g}"), found.result.message]
+    lines = [study.title, shown(table), found.result.message]
     if found.many is not None:
         lines.append(found.many.message)
     for name, errors in summary["relative_errors"].items():

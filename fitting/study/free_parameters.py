@@ -109,12 +109,13 @@ def _parameter(document: TomlDocument, key: Key, model: Any) -> Parameter:
         raise table.error("upper", f"has the unit {given[1].unit}, but lower has {given[0].unit}. Use one dimension.")
     # Zero is read in the first unit that the place may have: the other bound knows better.
     unit = next((bound.unit for bound in reversed(given) if bound.value != 0), given[0].unit if given else "")
-    prior = None
+    prior: tuple[float, float] | None = None
     if "prior" in table:
         pair = table.data["prior"]
         if not isinstance(pair, list) or len(pair) != 2:
             raise table.error("prior", f'must be a mean and a standard deviation, ["80 kg", "5 kg"], but is {pair!r}.')
-        prior = tuple(_quantity(document, (*key, "prior"), one, units).value for one in pair)
+        mean, deviation = (_quantity(document, (*key, "prior"), one, units).value for one in pair)
+        prior = mean, deviation
     return _checked(
         document,
         key,

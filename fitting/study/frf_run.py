@@ -12,17 +12,19 @@ velocity = "0.1 m/s"         # friction counts by its slope at this speed
 from pathlib import Path
 
 import numpy as np
-from twin.export.frf_csv import write_frf_csv
 
 from fitting.commands._outcome import Outcome
+from fitting.report.responses import responses_section
 from fitting.study.data import data_names
 from fitting.study.model_modes import linear_model
 from fitting.study.operating_point import KEYS, operating_point
 from fitting.study.responses import ResponseData, read_response
+from fitting.study.run_report import write_run_report
 from fitting.study.study_file import StudyFile
 from fitting.study.units_of_outputs import output_units
 from fitting.study.written import write_run
 from twin._checks import InputError
+from twin.export.frf_csv import write_frf_csv
 from twin.frf import FRF
 from twin.linear import frequency_response
 
@@ -59,8 +61,16 @@ def run_frf(study: StudyFile, out: Path) -> Outcome:
     peaks = {f"{o} / {i}": _peaks(frf, o, i) for o in frf.outputs for i in frf.inputs}
     summary = {"from": low, "to": high, "lines": frequency.size, "peaks": peaks}
     write_run(study, out, "frf", summary)
+    sections = [responses_section({"model": frf})]
+    for one in measured:
+        fitted = one.respond(study.model, one.measured.frequency)
+        index = np.ix_([fitted.outputs.index(o) for o in one.outputs], [fitted.inputs.index(i) for i in one.inputs])
+        seen = FRF(one.measured.frequency, one.measured.values, one.outputs, one.inputs, variance=one.measured.variance)
+        model = FRF(one.measured.frequency, fitted.values[index], one.outputs, one.inputs)
+        sections.append(responses_section({one.name: seen}, {one.name: model}))
+    report = write_run_report(study, out, f"Frequency response from {low:g} to {high:g} Hz.", sections)
     lines = [f"{name}: " + (", ".join(f"{f:.4g} Hz" for f in listed) or "no peak") for name, listed in peaks.items()]
-    return Outcome("\n".join([f"{study.title}: peaks of the response", *lines, f"Results in {out}"]), summary)
+    return Outcome("\n".join([f"{study.title}: peaks of the response", *lines, f"Report: {report}"]), summary)
 
 
 def _peaks(frf: FRF, output: str, excitation: str) -> list[float]:

@@ -61,7 +61,9 @@ class AskedOutputs(eqx.Module):
         Args:
             model: the model.
         """
-        found, trajectory, reference = {}, None, None
+        found: dict[str, Array] = {}
+        trajectory: Any = None
+        reference: Any = None
         if self.simulates:
             assert self.reference is not None and self.times is not None
             trajectory = simulate(model, self.reference, self.times, stepping=self.stepping)

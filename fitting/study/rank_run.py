@@ -7,11 +7,15 @@ samples = 256
 """
 
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
 from fitting.commands._outcome import Outcome
+from fitting.report.content import Cell, Section, Table
+from fitting.report.ranking import ranking_section
 from fitting.study.asked_outputs import asked_outputs
+from fitting.study.run_report import write_run_report
 from fitting.study.study_file import StudyFile
 from fitting.study.written import write_run
 from twin._checks import InputError
@@ -54,10 +58,24 @@ def run_rank(study: StudyFile, out: Path) -> Outcome:
     _draw(out / "sensitivity.png", by_output, study.title, measure)
     summary = {"method": method, "measure": measure, "ranking": by_output}
     write_run(study, out, "rank", summary)
+    section = _effects(found, measure) if method == "morris" else ranking_section(cast(Any, found))
+    task = f"Which of {len(study.space)} parameters move {', '.join(by_output)}?"
+    report = write_run_report(study, out, task, [section], space=study.space)
     lines = []
     for name, ranked in by_output.items():
         lines += [f"{name}: {measure}", *(f"  {path:40} {value:10.4g}" for path, value in ranked.items())]
-    return Outcome("\n".join([study.title, *lines, f"Results in {out}"]), summary)
+    return Outcome("\n".join([study.title, *lines, f"Report: {report}"]), summary)
+
+
+def _effects(found: Any, measure: str) -> Section:
+    """Elementary effects as a table; they have units and are no shares."""
+    rows = []
+    for i, path in enumerate(found.names):
+        numbers = [
+            Cell(f"{found.mu_star[j, i]:.3g} ± {found.mu_star_conf[j, i]:.2g}") for j in range(len(found.outputs))
+        ]
+        rows.append((Cell(path, "name"), *numbers))
+    return Section("Sensitivity", f"Elementary effects: {measure}.", tables=(Table(("", *found.outputs), tuple(rows)),))
 
 
 def _draw(file: Path, by_output: dict[str, dict[str, float]], title: str, measure: str) -> None:

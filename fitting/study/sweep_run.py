@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from fitting.commands._outcome import Outcome
+from fitting.report.sweeps import sweep_section
 from fitting.study.asked_outputs import asked_outputs, units_of_asked
+from fitting.study.run_report import write_run_report
 from fitting.study.study_file import StudyFile
 from fitting.study.written import write_run
 from twin._checks import InputError
@@ -61,10 +63,16 @@ def run_sweep(study: StudyFile, out: Path) -> Outcome:
     ranges = {name: _range(values, units.get(name, "")) for name, values in found.results.items()}
     summary = {"points": int(np.prod(found.shape)), "failed": failed, "results": ranges, "pictures": pictures}
     write_run(study, out, "sweep", summary)
+    told = (
+        [f"{failed} of {summary['points']} points failed; they are empty in the table and crossed out."]
+        if failed
+        else []
+    )
+    task = f"How do {', '.join(found.results)} change with {' and '.join(p.path for p in over)}?"
+    report = write_run_report(study, out, task, [sweep_section(found)], warnings=told)
     lines = [f"{name:24} {one['min']:12.5g} to {one['max']:<12.5g} {one['unit']}" for name, one in ranges.items()]
-    told = [f"{failed} points failed; they are empty in the table."] if failed else []
     head = f"{study.title}: {summary['points']} points over {', '.join(p.path for p in over)}"
-    return Outcome("\n".join([head, *lines, *told, f"Results in {out}"]), summary, code=1 if failed else 0)
+    return Outcome("\n".join([head, *lines, *told, f"Report: {report}"]), summary, code=1 if failed else 0)
 
 
 def _axis(study: StudyFile, key: Key) -> tuple[Parameter, np.ndarray]:

@@ -4,6 +4,7 @@ A drive that may be linear or rotary says "[m or rad]"; which of the two is mean
 """
 
 import inspect
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -26,13 +27,13 @@ def output_units(study: StudyFile) -> dict[str, str]:
     """
     loop = not isinstance(study.model, AbstractPlant)
     plant = study.model.plant if loop else study.model
-    kind = type(jax.eval_shape(plant.outputs, jnp.zeros(()), plant.initial_state(), plant.rest_inputs()))
+    kind: Any = type(jax.eval_shape(plant.outputs, jnp.zeros(()), plant.initial_state(), plant.rest_inputs()))
     table = study.document.table(("model",))
     written = table.get("plant", table) if loop or "plant" in table else table
     rotary = rotary_of(facts_of(type(plant)), written)
     facts = facts_of(kind) if inspect.isclass(kind) else {}
     found = {}
-    for name in kind._fields:
+    for name in getattr(kind, "_fields", ()):
         unit = pick_unit(facts[name].units, rotary) if name in facts else ""
         found[name] = si_unit(unit, unit, name=name) if unit else ""
     return found

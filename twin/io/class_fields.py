@@ -12,7 +12,7 @@ import itertools
 import re
 import textwrap
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 # What is written between brackets where any unit may be given.
 _OPEN = ("command unit", "output's unit", "...", " over ")
@@ -53,7 +53,7 @@ def facts_of(made: Callable[..., Any]) -> dict[str, FieldFacts]:
         described |= _of_arguments(made.__init__ if inspect.isclass(made) else made)
     fields = {f.name: f for f in dataclasses.fields(made)} if dataclasses.is_dataclass(made) else {}
     found = {}
-    for name, argument in inspect.signature(made).parameters.items():
+    for name, argument in inspect.signature(cast(Any, made)).parameters.items():
         if argument.kind in (argument.VAR_POSITIONAL, argument.VAR_KEYWORD):
             continue
         field = fields.get(name)
@@ -93,10 +93,11 @@ def _of_class(made: Any) -> dict[str, str]:
             continue
         statements = getattr(body, "body", [])
         for field, below in itertools.pairwise(statements):
-            named = isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
-            told = isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
-            if named and told and isinstance(below.value.value, str):
-                found[field.target.id] = " ".join(below.value.value.split())
+            if not (isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)):
+                continue
+            told = below.value.value if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) else None
+            if isinstance(told, str):
+                found[field.target.id] = " ".join(told.split())
     return found
 
 

@@ -46,10 +46,9 @@ def run(study: StudyFile, table: TomlTable, out: Path) -> Found:
         force = jnp.asarray(axis.gain) * record.channel("command")
         record = record.with_channel("force", force, "N")
     space = study.space
-    model = study.model
-    if axis is not model:
-        space, model = without_prefix(space, "plant."), axis
-    result = inverse_dynamics(record, model, space, decimation=table.integer("decimation", 10))
+    if axis is not study.model:
+        space = without_prefix(space, "plant.")
+    result = inverse_dynamics(record, axis, space, decimation=table.integer("decimation", 10))
     summary = {
         "parameters": {path: one._asdict() for path, one in result.estimates().items()},
         "status": result.message,

@@ -20,6 +20,7 @@ from fitting.identification.preloaded_drive import PreloadedDrive, identify_prel
 from fitting.plots import save_figure
 from fitting.study.data import read_record
 from fitting.study.procedures._found import Found
+from fitting.study.shown import shown
 from fitting.study.study_file import StudyFile
 from twin.drives import RackPinionDrive
 from twin.io.quantity import parse_quantity
@@ -67,9 +68,9 @@ def run(study: StudyFile, table: TomlTable, out: Path) -> Found:
         seed=study.seed,
     )
     _draw(found, out / "laws.png")
-    shown = found.result.to_dataframe()[["unit", "estimate", "standard error", "95 % from", "95 % to", "remark"]]
-    lines = [found.chain.to_dataframe().to_string(float_format=lambda x: f"{x:.5g}")]
-    lines.append(shown.to_string(float_format=lambda x: f"{x:.5g}"))
+    estimates = found.result.to_dataframe()[["unit", "estimate", "standard error", "95 % from", "95 % to", "remark"]]
+    lines = [shown(found.chain.to_dataframe())]
+    lines.append(shown(estimates))
     lines += [found.result.message] + ([found.many.message] if found.many else [])
     lines += [f"Control {control.name}: {control.sentence}" for control in found.controls]
     intervals = found.result.intervals()

@@ -28,6 +28,7 @@ from twin.paths import get_leaf
 from twin.plant import AbstractPlant
 from twin.record import Record
 from twin.references import AbstractReference, SampledReference, SampledSignal
+from twin.stepping import AbstractStepping
 
 _RECORD = ("kind", "file", "format", "read", "time", "start", "stop", "rate", "gaps", "channels")
 _DRIVEN = ("reference", "inputs", "hold", "initial", "compare")
@@ -50,6 +51,8 @@ class RecordData:
     """Standard deviation of the noise of each channel compared, SI."""
     remarks: tuple[str, ...]
     """What was assumed or changed on the way."""
+    stepping: AbstractStepping | None = None
+    """How time is stepped along it; None for what suits the model."""
 
 
 def read_record(study: StudyFile, name: str) -> RecordData:

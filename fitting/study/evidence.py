@@ -20,7 +20,8 @@ from fitting.study.study_file import StudyFile
 from twin._checks import InputError
 from twin.control import SampledLoop
 from twin.paths import set_leaves
-from twin.simulation import check_ticks, simulate
+from twin.simulation import check_ticks, choose_substeps, simulate
+from twin.stepping import AbstractStepping
 from twin.trajectory import SimulationStatus, Trajectory
 
 
@@ -80,7 +81,7 @@ def read_data(study: StudyFile) -> StudyData:
         for path in one.initial:
             if "free" in study.document.data and path in study.space.paths:
                 raise study.document.error(("data", one.name, "initial", path), "is free as well. Remove one.")
-    return StudyData(records, responses)
+    return StudyData(tuple(dataclasses.replace(one, stepping=stepping_of(study, one)) for one in records), responses)
 
 
 def evidence_of(data: StudyData, study: StudyFile) -> AbstractResidual:
@@ -97,7 +98,7 @@ def evidence_of(data: StudyData, study: StudyFile) -> AbstractResidual:
     for one in data.records:
         if one.reference is None or not one.deviation:
             continue
-        part = TrajectoryResidual.create(one.record, one.reference, one.deviation, stepping=study.stepping)
+        part = TrajectoryResidual.create(one.record, one.reference, one.deviation, stepping=one.stepping)
         if one.initial:
             part = WithLeaves(part, tuple(jnp.asarray(v) for v in one.initial.values()), tuple(one.initial))
         parts.append(part)
@@ -110,20 +111,41 @@ def evidence_of(data: StudyData, study: StudyFile) -> AbstractResidual:
     return parts[0] if len(parts) == 1 else JointResidual(tuple(parts), tuple(names))
 
 
+# Samples along which substeps are chosen, and the most that are taken.
+_TRIED, _MOST_SUBSTEPS = 20_000, 32
 FIT_KEYS = ("starts", "max_steps", "correlated", "loss", "hold_back", "controls", "profile")
 """Keys of the table [fit]."""
 
 
-def simulate_record(study: StudyFile, model: Any, one: RecordData) -> Trajectory:
+def stepping_of(study: StudyFile, one: RecordData) -> AbstractStepping | None:
+    """How time is stepped along a record: as the study says, else by constant steps from sample to sample.
+
+    A fit needs a cost that is smooth to the last digit, which steps that change with the parameters do not give. Where
+    many steps to a sample would be needed, steps are adaptive all the same.
+
+    Args:
+        study: the study.
+        one: the record.
+    """
+    if study.stepping is not None or one.reference is None:
+        return study.stepping
+    started = set_leaves(study.model, dict(one.initial)) if one.initial else study.model
+    part = one.record.times[: min(one.record.times.size, _TRIED)]
+    try:
+        return choose_substeps(started, one.reference, part, most=_MOST_SUBSTEPS)
+    except InputError:
+        return None
+
+
+def simulate_record(model: Any, one: RecordData) -> Trajectory:
     """What a model does under what drove a record, at the times of the record.
 
     Args:
-        study: the study, for its stepping.
         model: the model.
         one: the record.
     """
     started = set_leaves(model, dict(one.initial)) if one.initial else model
-    return _simulated(started, one.reference, one.record.times, study.stepping)
+    return _simulated(started, one.reference, one.record.times, one.stepping)
 
 
 @eqx.filter_jit

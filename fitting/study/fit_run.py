@@ -138,7 +138,7 @@ def fit_study(study: StudyFile, out: Path | None = None) -> FitRun:
         controls = _controls(study, evidence, data.only(held), result)
     simulated, problems = {}, []
     for one in data.records:
-        trajectory = simulate_record(study, result.model, one)
+        trajectory = simulate_record(result.model, one)
         if problem := status_of(trajectory):
             problems.append(f"{one.name}: {problem}")
         simulated[one.name] = {name: np.asarray(trajectory.channel(name)) for name in one.deviation}

@@ -8,23 +8,25 @@ import pytest
 from fitting.cli import main
 from fitting.result import FitResult
 from twin.batch import StudyInterrupted, batched
-from twin.io.parameter_file import read_parameters
 
 
 @pytest.mark.slow
-def test_demo_recovers_its_parameters(tmp_path, capsys):
-    from fitting.demo import demo_axis
-
-    assert main(["demo", "--out", str(tmp_path)]) == 0
+def test_demo_identifies_the_drive(tmp_path, capsys):
+    out = tmp_path / "demo"
+    assert main(["demo", "--out", str(out), "--force"]) == 0
     printed = capsys.readouterr().out
-    summary = json.loads((tmp_path / "summary.json").read_text())
+    summary = json.loads((out / "summary.json").read_text())
+    assert str(out / "report.html") in printed
+    assert "held back" in (out / "report.html").read_text()
     for path, row in summary["parameters"].items():
         assert path in printed
-        assert abs(row["value"] - row["true"]) < 4 * row["standard_error"]
-    entries = read_parameters(tmp_path / "parameters.toml")
-    assert [e.path for e in entries] == list(summary["parameters"])
-    assert {f.name for f in tmp_path.glob("*.png")} == {"record_and_fit.png", "intervals.png"}
-    assert demo_axis().plant.mass == summary["parameters"]["plant.mass"]["true"]
+        assert row["value"] > 0
+    # The bench has friction and cogging that the model has not; the laws themselves are what counts.
+    assert summary["largest_stiffness_error"] < 0.02
+    assert summary["largest_damping_error"] < 0.05
+    assert abs(summary["parameters"]["train_1.mesh.stiffness.k1"]["value"] / 1.8709e7 - 1) < 0.05
+    assert all(control["passed"] for control in summary["controls"])
+    assert len(list((out / "records").glob("*.csv"))) == 5
 
 
 def test_missing_data_is_one_clear_line(tmp_path, capsys, monkeypatch):

@@ -11,6 +11,7 @@ import numpy as np
 from twin._checks import InputError
 from twin.frf import FRF
 from twin.io._files import existing_file
+from twin.io._response_columns import named_responses
 from twin.io.formats import universal
 from twin.io.measurement import MeasuredChannel, Measurement, read_measurement
 from twin.io.units import to_si
@@ -40,6 +41,8 @@ class ResponseChoice:
     """Unit of the phase; None takes the file's, and deg where it says nothing."""
     deviation: str | None = None
     """Column of the standard deviation of the complex value, in the same unit."""
+    variance: str | None = None
+    """Column of its square instead."""
     coherence: str | None = None
     """Column of the coherence γ²; with `averages` it gives the variance |G|²(1-γ²)/(γ² averages)."""
     averages: int | None = None
@@ -61,8 +64,8 @@ def read_frf(
     Args:
         path: a table with a column of frequencies, or a universal file.
         responses: for each pair (response, excitation) its columns; every response must be given for every excitation.
-            None for a universal file, or for a table of one response whose columns name themselves: complex; re, im;
-            or mag, phase.
+            None for a universal file, or for a table whose columns name themselves: complex; "real x/F" and
+            "imaginary x/F"; "mag x/F" and "phase x/F"; the names may be left out where there is one response.
         form: "receptance", "mobility", "accelerance" or "ratio".
         frequency: name of the column of frequencies; None finds it.
         frequency_unit: its unit, such as "Hz" or "rad/s"; None takes the file's, and Hz where it says nothing.
@@ -85,7 +88,11 @@ def read_frf(
         return read_frf_uff(file)
     found = read_measurement(path, format=format, **options)
     axis = _frequencies(found, frequency, frequency_unit)
-    chosen = dict(responses) if responses is not None else {("response", "excitation"): _by_name(found)}
+    chosen = (
+        dict(responses)
+        if responses is not None
+        else {pair: ResponseChoice(**columns) for pair, columns in named_responses(found).items()}
+    )
     outputs = tuple(dict.fromkeys(output for output, _ in chosen))
     inputs = tuple(dict.fromkeys(excitation for _, excitation in chosen))
     values = np.empty((len(outputs), len(inputs), axis.size), dtype=complex)
@@ -119,29 +126,6 @@ def _frequencies(found: Measurement, name: str | None, unit: str | None) -> np.n
     return to_si(column, unit, "Hz", name=f"frequencies of {found.source!r}")
 
 
-def _by_name(found: Measurement) -> ResponseChoice:
-    """The columns of a table of one response, as they name themselves."""
-    complex_ones = [one.name for one in found if one.values.dtype.kind == "c"]
-    if len(complex_ones) == 1:
-        return ResponseChoice(value=complex_ones[0])
-
-    def called(*starts: str) -> str | None:
-        fitting = [one.name for one in found if one.name.lower().lstrip("|(").startswith(starts)]
-        return fitting[0] if len(fitting) == 1 else None
-
-    real, imaginary = called("re"), called("im")
-    magnitude, phase = called("mag", "amp", "abs", "gain", "betrag"), called("phase", "phi", "arg", "ang")
-    deviation = called("std", "sigma", "deviation")
-    if real and imaginary:
-        return ResponseChoice(real=real, imaginary=imaginary, deviation=deviation)
-    if magnitude and phase:
-        return ResponseChoice(magnitude=magnitude, phase=phase, deviation=deviation)
-    raise InputError(
-        f"The columns of {found.source!r} do not tell a single response: {', '.join(map(repr, found.names))}. Name "
-        "them by responses={('response', 'excitation'): ResponseChoice(...)}."
-    )
-
-
 def _response(found: Measurement, choice: ResponseChoice, size: int, label: str) -> tuple[np.ndarray, np.ndarray]:
     def column(name: str) -> MeasuredChannel:
         one = found[name]
@@ -172,6 +156,8 @@ def _response(found: Measurement, choice: ResponseChoice, size: int, label: str)
 def _variance(values: np.ndarray, choice: ResponseChoice, column: Any, label: str) -> np.ndarray:
     if choice.deviation is not None:
         return column(choice.deviation).values ** 2
+    if choice.variance is not None:
+        return column(choice.variance).values
     if choice.coherence is None:
         return np.full(values.shape, np.nan)
     coherence = column(choice.coherence).values

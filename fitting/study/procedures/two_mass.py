@@ -9,6 +9,8 @@ excitation = "current"
 
 from pathlib import Path
 
+import numpy as np
+
 from fitting.identification.two_mass import identify_two_mass, two_mass_response
 from fitting.study.data import data_names
 from fitting.study.procedures._found import Found
@@ -50,7 +52,13 @@ def run(study: StudyFile, table: TomlTable, out: Path) -> Found:
     model = two_mass_response(found.model, measured.frequency)
     rows = [measured.outputs.index(motor), measured.outputs.index(load)]
     column = [measured.inputs.index(excitation)]
-    shown = FRF(measured.frequency, measured.values[rows][:, column], (motor, load), (excitation,), measured.form)
+    shown = FRF(
+        measured.frequency,
+        np.asarray(measured.values)[np.ix_(rows, column)],
+        (motor, load),
+        (excitation,),
+        measured.form,
+    )
     fitted = FRF(measured.frequency, model.values, (motor, load), (excitation,), measured.form)
     summary = {
         "parameters": {path: one._asdict() for path, one in found.result.estimates().items()},

@@ -1,195 +1,20 @@
-"""The commands that answer a study file, from text to result folder, as a user types them."""
+"""The commands that ask a study's model, as a user types them."""
 
 import json
 import tomllib
 
-import jax
 import numpy as np
+import pandas as pd
 import pytest
 
 from fitting.cli import main
-from fitting.study.study_file import read_study
-from twin._tree_names import leaf_name
-from twin.drives import TwoMass
-from twin.io.parameter_file import read_parameters
-from twin.laws import ViscousFriction
+from tests.fitting.study.two_mass_study import FIT, MODEL, TRUTH, truth, write_record, write_study
 from twin.modal import damped_modes
-from twin.references import SampledSignal
-from twin.simulation import simulate
-
-MODEL = """
-[study]
-title = "two masses"
-
-[model]
-type = "TwoMass"
-motor_inertia = "2e-3 kg m^2"
-load_inertia = "30 kg cm^2"
-stiffness = "100 N m/rad"
-damping = "0.02 N m s/rad"
-gain = "0.5 N m/A"
-motor_friction = { type = "ViscousFriction", viscous = "5e-3 N m s/rad" }
-load_friction = { type = "ViscousFriction", viscous = "2e-3 N m s/rad" }
-"""
-FIT = """
-[free]
-load_inertia = { lower = "5e-4 kg m^2", upper = "2e-2 kg m^2", scale = "log" }
-stiffness = { lower = "10 N m/rad", upper = "1000 N m/rad", scale = "log" }
-damping = { lower = "0 N m s/rad", upper = "0.2 N m s/rad" }
-
-[data.run1]
-file = "records/run1.csv"
-inputs = { command = "current" }
-
-[data.run1.channels]
-current = { column = "i" }
-position = { column = "phi_m", deviation = "0.01 deg" }
-load_position = { column = "phi_l", deviation = "0.01 deg" }
-"""
-TRUTH = {"load_inertia": 4.1e-3, "stiffness": 130.0, "damping": 0.03}
 
 
-def truth(**changes):
-    values = {"motor_inertia": 2e-3, "load_inertia": 3e-3, "stiffness": 100.0, "damping": 0.02} | changes
-    return TwoMass(**values, motor_friction=ViscousFriction(5e-3), load_friction=ViscousFriction(2e-3), gain=0.5)
-
-
-def write_record(file, *, model=None, seed=1, count=1200):
-    """A pseudo-random current through the drive: semicolons, decimal commas, milliseconds, degrees."""
-    file.parent.mkdir(exist_ok=True, parents=True)
-    random = np.random.default_rng(seed)
-    times = np.arange(count) * 5e-4
-    current = np.repeat(random.choice([-2.0, 2.0], count // 20 + 1), 20)[:count] * (times > 0.02)
-    plant = model or truth(**TRUTH)
-    rest = plant.rest_inputs()
-    names = [leaf_name(keys) for keys, _ in jax.tree_util.tree_leaves_with_path(rest)]
-    signal = SampledSignal(times, type(rest)(*(current if name == "command" else 0 * times for name in names)))
-    outputs = simulate(plant, signal, times).outputs
-    noise = np.radians(0.01) * random.standard_normal((2, count))
-    columns = [times * 1e3, current, *np.degrees(np.stack([outputs.position, outputs.load_position]) + noise)]
-    rows = [";".join(f"{value:.6f}".replace(".", ",") for value in row) for row in np.transpose(columns)]
-    file.write_text("Zeit [ms];i [A];phi_m [deg];phi_l [deg]\n" + "\n".join(rows) + "\n", encoding="utf-8")
-
-
-def write_study(folder, text, name="study.toml"):
-    folder.mkdir(exist_ok=True, parents=True)
-    (folder / name).write_text(text, encoding="utf-8")
-    return str(folder / name)
-
-
-@pytest.fixture(scope="module")
-def fitted(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("fitted")
-    write_record(folder / "records" / "run1.csv")
-    study = write_study(folder, MODEL + FIT)
-    code = main(["fit", study, "--out", str(folder / "out")])
-    return folder, code
-
-
-def test_fit_finds_the_truth(fitted):
-    folder, code = fitted
-    summary = json.loads((folder / "out" / "summary.json").read_text())
-    assert code == 0
-    assert summary["converged"]
-    for path, true in TRUTH.items():
-        one = summary["parameters"][path]
-        assert abs(one["value"] - true) < 4 * one["standard_error"]
-        low, high = one["interval_95"]
-        assert low < one["value"] < high
-        assert one["verdict"] == "identified"
-    assert 0.9 < summary["rms"] < 1.1
-    assert all(control["passed"] for control in summary["controls"])
-    assert len(summary["controls"]) == 2
-    assert "jax" in summary["versions"]
-    assert len(summary["data"]["run1"]["sha256"]) == 64
-
-
-def test_result_folder_is_complete(fitted):
-    folder, _ = fitted
-    out = folder / "out"
-    entries = {entry.path: entry for entry in read_parameters(out / "parameters.toml")}
-    assert entries["stiffness"].unit == "N m/rad"
-    page = (out / "report.html").read_text()
-    assert "two masses" in page
-    assert "<script>" not in page.replace('<script type="text/javascript">', "")
-    assert (out / "fit_run1.png").stat().st_size > 10_000
-
-
-def test_a_run_can_be_repeated_from_its_folder(fitted, capsys):
-    folder, _ = fitted
-    before = json.loads((folder / "out" / "summary.json").read_text())
-    assert main(["fit", str(folder / "out" / "study.toml"), "--out", str(folder / "again"), "--json"]) == 0
-    again = json.loads(capsys.readouterr().out)
-    assert again["parameters"] == before["parameters"]
-    assert again["data"] == before["data"]
-
-
-def test_the_fitted_study_goes_on(fitted, capsys):
-    folder, _ = fitted
-    model = read_study(folder / "out" / "fitted.toml").model
-    summary = json.loads((folder / "out" / "summary.json").read_text())
-    assert float(model.stiffness) == summary["parameters"]["stiffness"]["value"]
-    assert main(["modes", str(folder / "out" / "fitted.toml"), "--out", str(folder / "modes"), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)["modes"]
-    assert len(found) == 1
-    assert found[0]["frequency_Hz"] == pytest.approx(float(damped_modes(model.second_order()).frequency[0]), rel=1e-9)
-
-
-def test_fit_does_not_write_over_results(fitted, capsys):
-    folder, _ = fitted
-    assert main(["fit", str(folder / "study.toml"), "--out", str(folder / "out")]) == 2
-    assert "--force" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_many_starts_and_data_held_back(tmp_path, capsys):
-    write_record(tmp_path / "records" / "run1.csv")
-    write_record(tmp_path / "records" / "run2.csv", seed=2)
-    second = FIT[FIT.index("[data.run1]") :].replace("run1", "run2")
-    more = '\n[fit]\nstarts = 8\nhold_back = ["run2"]\n'
-    assert (
-        main(["fit", write_study(tmp_path, MODEL + FIT + second + more), "--out", str(tmp_path / "out"), "--json"]) == 0
-    )
-    summary = json.loads(capsys.readouterr().out)
-    assert summary["held_back"] == ["run2"]
-    assert summary["starts"]["drawn"] == 8
-    assert summary["relative_errors"]["run2"]["position"] < 0.05
-    assert any("held back" in control["name"] and control["passed"] for control in summary["controls"])
-    assert "waterfall" in (tmp_path / "out" / "report.html").read_text().lower() or summary["starts"]["converged"] >= 1
-
-
-BAD_DATA = [
-    ('file = "records/run1.csv"', 'file = "records/run9.csv"', "does not exist"),
-    ('file = "records/run1.csv"', 'file = "../../../etc"', "does not exist"),
-    ('column = "i"', 'column = "j"', "j"),
-    ('{ command = "current" }', '{ comand = "current" }', "Did you mean 'command'"),
-    ('{ command = "current" }', '{ command = "curent" }', "Did you mean 'current'"),
-    ('inputs = { command = "current" }', 'reference = "current"\ninputs = { command = "current" }', "stands beside"),
-    ('inputs = { command = "current" }', "", "what drove the drive"),
-    ('inputs = { command = "current" }', 'inputs = { command = "current" }\ncompare = ["speed"]', "speed"),
-    ('deviation = "0.01 deg"', 'deviation = "0.01 mm"', "expected"),
-    ('deviation = "0.01 deg"', 'deviation = "-1 deg"', "must be positive"),
-    ('column = "phi_m"', 'colum = "phi_m"', "Did you mean 'column'"),
-    ('column = "phi_m"', 'column = "phi_m", unit = "mm"', ""),
-    ('inputs = { command = "current" }', 'inputs = { command = "current" }\nstart = "9 s"', ""),
-    ('inputs = { command = "current" }', 'inputs = { command = "current" }\nrate = "-5 Hz"', "must be positive"),
-    ('inputs = { command = "current" }', 'inputs = { command = "current" }\nkind = "film"', "known are"),
-    ("[data.run1]", '[data.run1]\nformat = "docx"', "docx"),
-]
-
-
-@pytest.mark.parametrize(("old", "new", "told"), BAD_DATA)
-def test_bad_data_sections_are_one_line(tmp_path, capsys, old, new, told):
-    text = MODEL + FIT
-    assert old in text
-    write_record(tmp_path / "records" / "run1.csv", count=200)
-    code = main(["fit", write_study(tmp_path, text.replace(old, new, 1)), "--out", str(tmp_path / "out")])
-    error = capsys.readouterr().err
-    assert code == 2
-    assert error.startswith("drivetwin: study file")
-    assert "line " in error
-    assert told in error
-    assert "Traceback" not in error
+def vibration(model):
+    found = damped_modes(model.second_order())
+    return float(found.frequency[int(np.flatnonzero(np.asarray(found.oscillating))[0])])
 
 
 def test_simulate(tmp_path, capsys):
@@ -247,12 +72,12 @@ def test_sweep_of_modes_equals_the_modes(tmp_path, capsys):
         '[sweep.over]\nstiffness = { from = "50 N m/rad", to = "0.2 N m/mrad", count = 4 }\n'
     )
     assert main(["sweep", write_study(tmp_path, text), "--out", str(tmp_path / "out")]) == 0
-    table = np.genfromtxt(tmp_path / "out" / "sweep.csv", delimiter=",", names=True)
-    for row in table:
-        model = truth(stiffness=row[0])
-        found = damped_modes(model.second_order())
-        chosen = int(np.flatnonzero(np.asarray(found.oscillating))[0])
-        assert row[1] == pytest.approx(float(found.frequency[chosen]), rel=1e-6)
+    table = pd.read_csv(tmp_path / "out" / "sweep.csv")
+    stiffness = next(name for name in table if name.startswith("stiffness"))
+    frequency = next(name for name in table if name.startswith("frequency"))
+    assert len(table) == 4
+    for _, row in table.iterrows():
+        assert row[frequency] == pytest.approx(vibration(truth(stiffness=row[stiffness])), rel=1e-6)
     assert (tmp_path / "out" / "sweep_frequency_1.png").exists()
 
 

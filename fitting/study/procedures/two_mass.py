@@ -9,6 +9,7 @@ excitation = "current"
 
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 
 from fitting.identification.two_mass import identify_two_mass, two_mass_response
@@ -54,7 +55,7 @@ def run(study: StudyFile, table: TomlTable, out: Path) -> Found:
     column = [measured.inputs.index(excitation)]
     shown = FRF(
         measured.frequency,
-        np.asarray(measured.values)[np.ix_(rows, column)],
+        jnp.asarray(measured.values)[np.ix_(rows, column)],
         (motor, load),
         (excitation,),
         measured.form,

@@ -1,4 +1,4 @@
-"""The demo: a servo axis with known parameters is simulated, recorded with noise, and identified from the records."""
+"""An example axis with known parameters, a motion, what is free, and a simulated record with noise."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -41,7 +41,7 @@ def demo_reference() -> SumReference:
 
 
 def demo_space() -> ParameterSpace:
-    """What the demo identifies."""
+    """What can be identified from a record of the axis."""
     return ParameterSpace(
         [
             Parameter("plant.mass", "kg", 10.0, 1000.0, scale="log"),

@@ -1,11 +1,6 @@
 """Names, units and descriptions of what a plant's structures hold, read from the docstrings beside their fields."""
 
-import ast
-import functools
-import inspect
-import itertools
 import re
-import textwrap
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from twin._tree_names import leaf_name
+from twin.io.class_fields import field_texts
 from twin.plant import AbstractPlant
 
 # A unit that leaves a choice, or a relation of two, is no unit to write into a file.
@@ -62,32 +58,13 @@ def _facts(structure: Any, keys: Any) -> tuple[str, str]:
     for key in keys:
         name = getattr(key, "name", None)
         if name is not None:
-            told = _docstrings(type(node)).get(name)
+            told = field_texts(type(node)).get(name)
             unit, text = (_unit(told), _sentence(told)) if told else (unit, text)
             node = getattr(node, name)
         else:
             index: Any = getattr(key, "key", getattr(key, "idx", None))
             node = node[index] if isinstance(node, dict | list | tuple) else None
     return unit, text
-
-
-@functools.cache
-def _docstrings(cls: type) -> dict[str, str]:
-    """The docstring under each field of a class, and of the classes it is made from."""
-    found: dict[str, str] = {}
-    for base in reversed(cls.__mro__[:-1]):
-        if base.__module__.split(".")[0] in ("builtins", "equinox", "typing", "abc"):
-            continue
-        try:
-            tree = ast.parse(textwrap.dedent(inspect.getsource(base)))
-        except (OSError, TypeError, SyntaxError):  # a class without source, made in a console
-            continue
-        body = tree.body[0].body if isinstance(tree.body[0], ast.ClassDef) else []
-        for field, below in itertools.pairwise(body):
-            text = below.value.value if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) else None
-            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(text, str):
-                found[field.target.id] = " ".join(text.split())
-    return found
 
 
 def _unit(text: str) -> str:

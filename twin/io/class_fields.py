@@ -48,7 +48,7 @@ def facts_of(made: Callable[..., Any]) -> dict[str, FieldFacts]:
     Returns:
         Facts by name, in the order of the arguments.
     """
-    described = _of_class(made) if inspect.isclass(made) else {}
+    described = dict(field_texts(made)) if inspect.isclass(made) else {}
     if not inspect.isclass(made) or "__init__" in vars(made):
         described |= _of_arguments(made.__init__ if inspect.isclass(made) else made)
     fields = {f.name: f for f in dataclasses.fields(made)} if dataclasses.is_dataclass(made) else {}
@@ -72,17 +72,13 @@ def facts_of(made: Callable[..., Any]) -> dict[str, FieldFacts]:
     return found
 
 
-def summary_of(made: Callable[..., Any]) -> str:
-    """The first sentence of a docstring.
+@functools.cache
+def field_texts(made: type) -> dict[str, str]:
+    """The text under each field of a class, and of the classes it is made from.
 
     Args:
-        made: a class or function.
+        made: a class; one that was typed in has no source, and no texts.
     """
-    text = inspect.getdoc(made) or ""
-    return " ".join(text.split("\n\n")[0].split())
-
-
-def _of_class(made: Any) -> dict[str, str]:
     found: dict[str, str] = {}
     for owner in reversed(made.__mro__):
         if owner.__module__.startswith(("builtins", "abc", "equinox")):
@@ -99,6 +95,16 @@ def _of_class(made: Any) -> dict[str, str]:
             if isinstance(told, str):
                 found[field.target.id] = " ".join(told.split())
     return found
+
+
+def summary_of(made: Callable[..., Any]) -> str:
+    """The first sentence of a docstring.
+
+    Args:
+        made: a class or function.
+    """
+    text = inspect.getdoc(made) or ""
+    return " ".join(text.split("\n\n")[0].split())
 
 
 def _of_arguments(made: Any) -> dict[str, str]:

@@ -12,7 +12,6 @@ velocity = "0.1 m/s"         # friction counts by its slope at this speed
 from pathlib import Path
 
 import numpy as np
-from twin.export.frf_csv import write_frf_csv
 
 from fitting.commands._outcome import Outcome
 from fitting.study.data import data_names
@@ -23,6 +22,7 @@ from fitting.study.study_file import StudyFile
 from fitting.study.units_of_outputs import output_units
 from fitting.study.written import write_run
 from twin._checks import InputError
+from twin.export.frf_csv import write_frf_csv
 from twin.frf import FRF
 from twin.linear import frequency_response
 

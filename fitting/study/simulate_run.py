@@ -5,7 +5,6 @@ from typing import Any
 
 import equinox as eqx
 import numpy as np
-from twin.export.trajectory import write_trajectory
 
 from fitting.commands._outcome import Outcome
 from fitting.study.evidence import status_of
@@ -13,6 +12,7 @@ from fitting.study.motion import Motion, read_motion
 from fitting.study.study_file import StudyFile
 from fitting.study.units_of_outputs import output_units
 from fitting.study.written import write_run
+from twin.export.trajectory import write_trajectory
 from twin.simulation import simulate
 from twin.trajectory import Trajectory
 

@@ -49,9 +49,10 @@ autosummary_generate = True
 autosummary_imported_members = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
+autodoc_inherit_docstrings = False
 autodoc_preserve_defaults = True
 autodoc_class_signature = "mixed"
-autodoc_default_options = {"members": True, "show-inheritance": False, "undoc-members": False}
+autodoc_default_options = {"members": True}
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_rtype = False
@@ -61,25 +62,25 @@ python_use_unqualified_type_names = True
 toc_object_entries_show_parents = "hide"
 
 default_role = "code"
+_SIDE = ["sidebar-nav-bs"]
 html_theme = "pydata_sphinx_theme"
 html_title = "drivetwin"
 html_static_path = ["_static"]
 html_css_files = ["drivetwin.css"]
 html_copy_source = False
 html_show_sourcelink = False
-html_sidebars = {"index": [], "traps": [], "limits": []}
+html_sidebars = {"*": [], "api/**": _SIDE, "notebooks/**": _SIDE, "papers/**": _SIDE}
 html_theme_options = {
     "navigation_with_keys": False,
-    "show_toc_level": 2,
+    "show_toc_level": 1,
     "navbar_align": "left",
-    "header_links_before_dropdown": 6,
+    "header_links_before_dropdown": 8,
     "footer_start": [],
     "footer_end": [],
     "secondary_sidebar_items": ["page-toc"],
     "pygments_light_style": "friendly",
     "pygments_dark_style": "monokai",
 }
-# Formulas are drawn by the reader's browser from this address; all else is in the folder.
 
 # Docstrings are plain text with Google's sections. Bars, stars and trailing underscores in their formulas are markup to
 # Sphinx and are escaped; code between single quotes of the other kind becomes code.

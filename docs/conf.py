@@ -34,13 +34,13 @@ release = version_of("drivetwin")
 version = release
 language = "en"
 
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "myst_nb"]
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon", "myst_nb"]
 exclude_patterns = ["examples", "_templates", "**/.ipynb_checkpoints"]
 templates_path = ["_templates"]
 
 nb_execution_mode = "off"
 nb_merge_streams = True
-myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "fieldlist"]
+myst_enable_extensions = ["colon_fence", "deflist", "fieldlist"]
 myst_heading_anchors = 3
 # Links from pages to files of the repository are those that a reader of the repository follows.
 suppress_warnings = ["mystnb.unknown_mime_type", "myst.header"]
@@ -121,7 +121,13 @@ def _as_it_was(app: Any, what: str, name: str, obj: Any, options: Any, lines: li
         lines[:] = [*_fields[name], ""]
 
 
+def _to_copies(app: Any, page: str, source: list[str]) -> None:
+    # In the repository pages lead to the notebooks themselves, here to the copies.
+    source[0] = source[0].replace("](../notebooks/", "](notebooks/").replace("](../../notebooks/", "](../notebooks/")
+
+
 def setup(app: Any) -> None:
     """Called by Sphinx."""
+    app.connect("source-read", _to_copies)
     app.connect("autodoc-process-docstring", _plain, priority=400)  # before napoleon reads the sections
     app.connect("autodoc-process-docstring", _as_it_was, priority=600)

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.synced
 
-.PHONY: demo test slow bench lint types notebooks lock clean
+.PHONY: demo test slow bench lint types docs notebooks lock clean
 
 demo: $(STAMP)
 	$(BIN)/drivetwin demo --out out/demo --force
@@ -24,6 +24,9 @@ lint: $(STAMP)
 
 types: $(STAMP)
 	$(BIN)/pyright
+
+docs: $(STAMP)
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
 
 notebooks: $(STAMP)
 	DRIVETWIN_FAST=0 $(BIN)/python -m pytest -q tests/notebooks

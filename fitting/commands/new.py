@@ -9,6 +9,10 @@ from fitting.commands._outcome import Outcome
 HELP = "write a commented study file for a drive to begin with"
 
 
+# What to try first with the file as it is.
+_FIRST = {"rack-pinion": "modes"}
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("drive", nargs="?", help="the drive; without it, they are listed")
@@ -27,12 +31,13 @@ def run(options: argparse.Namespace) -> Outcome:
         known = {name: module.HELP for name, module in known_drives().items()}
         lines = ["Drives:", *(f"  {name:14} {told}" for name, told in known.items())]
         return Outcome("\n".join([*lines, "Write a study file by: drivetwin new DRIVE"]), {"drives": known})
-    text = new_study(options.drive, data=options.data)
     file = options.out or Path(f"{options.drive.replace('_', '-')}.toml")
+    text = new_study(options.drive, data=options.data, folder=file.parent)
     if file.exists() and not options.force:
         raise InputError(f"{str(file)!r} exists. Name another file by --out, or add --force to replace it.")
     if not file.parent.is_dir():
         raise InputError(f"the folder of {str(file)!r} does not exist. Create it first.")
     file.write_text(text, encoding="utf-8")
-    told = f"{file} written. Adapt it, then for instance: drivetwin modes {file}"
+    first = "fit" if options.data else _FIRST.get(options.drive.replace("_", "-"), "simulate")
+    told = f"{file} written. Adapt it, then for instance: drivetwin {first} {file}"
     return Outcome(told, {"file": str(file)})

@@ -113,7 +113,7 @@ def evidence_of(data: StudyData, study: StudyFile) -> AbstractResidual:
 
 # Samples along which substeps are chosen, and the most that are taken.
 _TRIED, _MOST_SUBSTEPS = 20_000, 32
-FIT_KEYS = ("starts", "max_steps", "correlated", "loss", "hold_back", "controls", "profile")
+FIT_KEYS = ("starts", "max_steps", "correlated", "loss", "hold_back", "controls")
 """Keys of the table [fit]."""
 
 

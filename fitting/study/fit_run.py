@@ -79,16 +79,7 @@ def run_fit(study: StudyFile, out: Path) -> Outcome:
     values = dict(zip(result.space.paths, result.values.tolist(), strict=True))
     write_fitted(study, out, result.space, values)
     result.save(out / "fit.npz")
-    write_parameters(
-        out / "parameters.toml",
-        [
-            ParameterEntry(
-                p.path, float(v), p.unit or "1", None if np.isnan(se) else float(se), p.lower, p.upper, study.title
-            )
-            for p, v, se in zip(result.space.parameters, result.values, result.standard_errors, strict=True)
-        ],
-        header=f"{study.title}\n{result.message}",
-    )
+    write_parameters(out / "parameters.toml", _entries(result, study.title), header=f"{study.title}\n{result.message}")
     summary = summary_of(found)
     whole = write_run(study, out, "fit", summary)
     report = write_fit_report(study, found, out, versions=whole["versions"])

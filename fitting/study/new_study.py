@@ -1,6 +1,7 @@
 """`drivetwin new`: a commented study file for a chosen drive."""
 
 import importlib
+import os
 import pkgutil
 import re
 from pathlib import Path
@@ -22,12 +23,13 @@ def known_drives() -> dict[str, Any]:
     return {name.replace("_", "-"): importlib.import_module(f"{drives.__name__}.{name}") for name in names}
 
 
-def new_study(drive: str, *, data: Path | None = None) -> str:
+def new_study(drive: str, *, data: Path | None = None, folder: Path | None = None) -> str:
     """The text of a study file.
 
     Args:
         drive: name of the drive, as in `known_drives`.
         data: a file of measurements whose channels are to be listed; None for an example.
+        folder: where the study file will lie, from which the path of the data counts; None for here.
 
     Raises:
         InputError: an unknown drive, or a file that cannot be read.
@@ -45,11 +47,11 @@ def new_study(drive: str, *, data: Path | None = None) -> str:
     )
     rest = module.REST
     if data is not None:
-        rest = _with_channels(rest, data)
+        rest = _with_channels(rest, data, folder or Path())
     return head + model_text(module.model()) + rest
 
 
-def _with_channels(rest: str, data: Path) -> str:
+def _with_channels(rest: str, data: Path, folder: Path) -> str:
     """The example's channels replaced by those of a file."""
     from twin.io.look import look
     from twin.io.measurement import read_measurement
@@ -61,14 +63,17 @@ def _with_channels(rest: str, data: Path) -> str:
     block = re.search(_EXAMPLE, rest, re.MULTILINE | re.DOTALL)
     if block is None:
         return rest + "\n" + "\n".join(lines) + "\n"
-    there = data.resolve().as_posix()
+    try:
+        there = Path(os.path.relpath(data.resolve(), folder.resolve())).as_posix()
+    except ValueError:  # on another drive of Windows
+        there = data.resolve().as_posix()
     kept = [line for line in block.group(2).split("\n") if not line.startswith("file")]
     example = re.findall(r"^(\w+) =", block.group(3), re.MULTILINE)
     channels = _renamed(lines[lines.index(f"[data.{own}.channels]") + 1 :], example)
     times = [line for line in lines[1:] if line.startswith("time")]
     new = [f"[data.{block.group(1)}]", f'file = "{there}"', *times, *kept, ""]
     new += [f"[data.{block.group(1)}.channels]        # names on the left must be those of the model:"]
-    new += [f"# it had: {line}" for line in block.group(3).split("\n")]
+    new += [f"# in the example: {line}" for line in block.group(3).split("\n")]
     return rest[: block.start()] + "\n".join([*new, *channels]) + rest[block.end() :]
 
 

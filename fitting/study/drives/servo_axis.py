@@ -17,6 +17,7 @@ REST = """
 "plant.mass" = { lower = "10 kg", upper = "1000 kg", scale = "log" }
 "plant.friction.coulomb" = { lower = "0 N", upper = "200 N" }
 "plant.friction.static" = { lower = "0 N", upper = "200 N" }
+"plant.friction.stribeck_velocity" = { lower = "1 mm/s", upper = "100 mm/s", scale = "log" }
 "plant.friction.viscous" = { lower = "0 N s/m", upper = "2000 N s/m" }
 "plant.offset" = { lower = "-50 N", upper = "50 N" }
 # A prior is a mean and a standard deviation: prior = ["95 kg", "5 kg"]

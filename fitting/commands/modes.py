@@ -23,7 +23,10 @@ def run(options: argparse.Namespace) -> Outcome:
     if options.file.suffix.lower() == ".toml":
         from fitting.commands._study_run import run_study
         from fitting.study.modes_run import run_modes
+        from twin._input_error import InputError
 
+        if options.band:
+            raise InputError("--band is for measured responses; the modes of a study's model are all given.")
         options.study = options.file
         return run_study(options, run_modes)
     from fitting.identification.modal_report import analyse_file

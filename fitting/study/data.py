@@ -66,6 +66,7 @@ def read_record(study: StudyFile, name: str) -> RecordData:
         InputError: naming the line and key of the study file, or what is wrong with the data file.
     """
     table = study.table("data", name, known=(*_RECORD, *_DRIVEN), required=True)
+    _ = study.model  # its own errors come first
     record, remarks = _measured(table, name)
     reference = _reference(study, table, record)
     initial = _initial(study, table, record)
@@ -88,6 +89,12 @@ def read_record(study: StudyFile, name: str) -> RecordData:
             raise study.document.error(
                 (*table.key, "channels", channel, "deviation"), f"must be positive, but is {written!r}."
             )
+    if "inputs" in table:
+        held = table.flag("hold", False)
+        remarks.append(
+            f"{name}: inputs are {'held from sample to sample' if held else 'straight between samples'}; "
+            f"{'hold = false' if held else 'hold = true'} is for {'measured, continuous' if held else 'digital'} ones."
+        )
     return RecordData(name, record, reference, initial, deviation, tuple(remarks))
 
 
@@ -130,7 +137,7 @@ def _measured(table: TomlTable, name: str) -> tuple[Record, list[str]]:
         one = TomlTable(table.document, key, _CHANNEL)
         choices[channel] = ChannelChoice(
             column=one.text("column", channel),
-            unit=one.text("unit") if "unit" in one else None,
+            unit=_unit(one),
             expected=one.text("expected") if "expected" in one else None,
             sign=one.quantity("sign", 1, units=("1",)).value,
             offset=one.quantity("offset").value if "offset" in one else 0.0,
@@ -161,10 +168,18 @@ def _measured(table: TomlTable, name: str) -> tuple[Record, list[str]]:
         raise table.error("", str(error)) from error
     record = prepared.record
     for channel, entry in table.table("channels").items():
-        if isinstance(entry, dict) and entry.get("from_zero"):
+        if isinstance(entry, dict) and TomlTable(table.document, (*table.key, "channels", channel), _CHANNEL).flag(
+            "from_zero", False
+        ):
             values = record.channel(channel)
             record = record.with_channel(channel, values - values[0], record.units[channel])
     return record, [f"{name}: {remark}" for remark in prepared.remarks]
+
+
+def _unit(channel: TomlTable) -> str | None:
+    if channel.data.get("unit") == "":
+        raise channel.error("unit", 'is empty. Fill in the unit of the column, such as "A"; "1" for a plain number.')
+    return channel.text("unit") if "unit" in channel else None
 
 
 def _reference(study: StudyFile, table: TomlTable, record: Record) -> AbstractReference | None:

@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     from fitting.study.fit_run import FitRun
 
 
-def write_fit_report(study: StudyFile, found: "FitRun", out: Path, *, versions: Mapping[str, str]) -> Path:
-    """Write `report.html`, and the pictures of record and response as PNG files.
+def write_fit_report(
+    study: StudyFile, found: "FitRun", out: Path, *, versions: Mapping[str, str]
+) -> tuple[Path, tuple[str, ...]]:
+    """Write `report.html`, and the pictures of records and intervals as PNG files.
 
     Args:
         study: the study.
@@ -27,7 +29,7 @@ def write_fit_report(study: StudyFile, found: "FitRun", out: Path, *, versions: 
         versions: versions of what computed.
 
     Returns:
-        Path of the report.
+        Path of the report, and the warnings at its head.
     """
     records = {one.name: one.record for one in found.data.records}
     report = fit_report(
@@ -50,7 +52,7 @@ def write_fit_report(study: StudyFile, found: "FitRun", out: Path, *, versions: 
         remarks=_by_data(found),
     )
     _draw(study, found, out)
-    return write_report(out / "report.html", report)
+    return write_report(out / "report.html", report), report.warnings
 
 
 def _by_data(found: "FitRun") -> dict[str, list[str]]:

@@ -33,7 +33,7 @@ from fitting.study.evidence import (
 from fitting.study.fit_report import write_fit_report
 from fitting.study.shown import shown
 from fitting.study.study_file import StudyFile
-from fitting.study.written import write_fitted, write_run
+from fitting.study.written import versions, write_fitted, write_run
 from twin._checks import InputError
 from twin.frf import FRF
 from twin.io.parameter_file import ParameterEntry, write_parameters
@@ -81,8 +81,9 @@ def run_fit(study: StudyFile, out: Path) -> Outcome:
     result.save(out / "fit.npz")
     write_parameters(out / "parameters.toml", _entries(result, study.title), header=f"{study.title}\n{result.message}")
     summary = summary_of(found)
+    report, warnings = write_fit_report(study, found, out, versions=versions())
+    summary["warnings"] = list(warnings)
     whole = write_run(study, out, "fit", summary)
-    report = write_fit_report(study, found, out, versions=whole["versions"])
     return Outcome(_text(study, found, summary, report), whole, code=0 if result.success and not found.problems else 1)
 
 
@@ -150,10 +151,14 @@ def _fitted(
 ) -> tuple[FitResult, MultistartResult | None]:
     table = study.table("fit", known=FIT_KEYS)
     starts, steps = table.integer("starts", 1), table.integer("max_steps", 100)
-    # Records of equal length are series of their own; where lengths differ, or there are responses, all count as one.
+    # Each channel of each record is a series.
     lengths = {one.record.times.size for one in data.records}
     series = sum(len(one.deviation) for one in data.records)
-    correlated = series if table.flag("correlated", False) and len(lengths) == 1 and not data.responses else None
+    correlated = series if table.flag("correlated", False) else None
+    if correlated and (len(lengths) != 1 or data.responses):
+        raise table.error(
+            "correlated", "needs records of one length and no frequency responses. Cut them by `start` and `stop`."
+        )
     if starts == 1:
         return fit(evidence, study.model, study.space, max_steps=steps, correlated=correlated), None
     many = multistart(
@@ -236,4 +241,5 @@ def _text(study: StudyFile, found: FitRun, summary: dict[str, Any], report: Path
         lines.append(f"{name} ({role}), relative error: {told}")
     lines += [f"Control {c['name']}: {c['sentence']}" for c in summary["controls"]]
     lines += found.problems
+    lines += [f"Warning: {warning}" for warning in summary["warnings"]]
     return "\n".join([*lines, f"Report: {report}"])

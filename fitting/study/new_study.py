@@ -57,6 +57,8 @@ def _with_channels(rest: str, data: Path, folder: Path) -> str:
     from twin.io.measurement import read_measurement
 
     lines = look(read_measurement(data)).study.strip().split("\n")
+    if 'kind = "frf"' in lines:
+        return rest + "\n" + "\n".join(lines) + "\n"
     if not lines[0].startswith("[data."):
         raise InputError(f"{str(data)!r} has no channels over time. Look at it by: drivetwin look {data}")
     own = lines[0][len("[data.") : -1]

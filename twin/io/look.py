@@ -6,9 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from twin._checks import InputError
 from twin.io._look_channel import Finding, channel_findings, clock_findings
 from twin.io._look_pairs import pair_findings
 from twin.io._look_roles import role_of
+from twin.io._response_columns import named_responses
 from twin.io.measurement import MeasuredChannel, Measurement
 
 _MOST_ROWS = 60
@@ -139,6 +141,8 @@ def _plain(facts: ChannelFacts) -> dict[str, Any]:
 
 
 def _study(measurement: Measurement) -> str:
+    if responses := _responses(measurement):
+        return responses
     chosen = [one for one in measurement if one.abscissa != "frequency" and one.values.dtype.kind == "f"]
     if not chosen:
         return ""
@@ -154,6 +158,23 @@ def _study(measurement: Measurement) -> str:
         key = role if used[role] == 1 else f"{role}_{used[role]}"
         missing = "" if one.unit else "  # the file states no unit: fill it in"
         lines.append(f"{key} = {{ column = {_quoted(one.name)}, unit = {_quoted(one.unit)} }}{missing}")
+    return "\n".join(lines)
+
+
+def _responses(measurement: Measurement) -> str:
+    """Lines of a table of frequency responses; empty where it is none."""
+    if not all(one.abscissa == "frequency" for one in measurement) or measurement.format == "universal":
+        return ""
+    try:
+        pairs = list(named_responses(measurement))
+    except InputError:
+        return ""
+    name = re.sub(r"[^A-Za-z0-9_-]+", "_", measurement.name).strip("_") or "response"
+    outputs, inputs = (tuple(dict.fromkeys(pair[i] for pair in pairs)) for i in (0, 1))
+    lines = [f"[data.{name}]", 'kind = "frf"', f"file = {_quoted(measurement.source)}"]
+    for kind, names in (("outputs", outputs), ("inputs", inputs)):
+        listed = ", ".join(f"{_quoted(one)} = {_quoted(one)}" for one in names)
+        lines.append(f"{kind} = {{ {listed} }}  # the model's name = the measured name")
     return "\n".join(lines)
 
 

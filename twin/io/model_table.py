@@ -101,6 +101,10 @@ class _Builder:
 
     def _vector(self, key: Key, written: Mapping[str, Any], facts: FieldFacts) -> np.ndarray:
         unit = written.get("unit", "1")
+        flat = written["values"]
+        numbers = isinstance(flat, list) and flat and all(isinstance(v, int | float) for v in flat)
+        if not numbers or not isinstance(unit, str):
+            raise self.document.error(key, 'must be like { values = [1.0, 2.0], unit = "N" }.')
         listed = [f"{value} {unit}" for value in np.ravel(written["values"]).tolist()]
         found = np.asarray([self._quantity(key, one, facts) for one in listed])
         return found.reshape(np.shape(written["values"]))

@@ -27,7 +27,7 @@ _SUPERSCRIPTS = {ord("²"): "^2", ord("³"): "^3", ord("⁻"): "^-", ord("¹"): 
 _SI_NAMES = (
     *("1", "s", "m", "m/s", "m/s^2", "m/s^3", "rad", "rad/s", "rad/s^2", "rad/s^3", "Hz", "kg", "kg m^2", "K"),
     *("N", "N m", "N/m", "N s/m", "N m/rad", "N m s/rad", "Pa", "W", "A", "V", "ohm", "H"),
-    *("N/A", "N m/A", "N/V", "N m/V", "V s/m", "V s/rad", "N^2 s/m", "1/s"),
+    *("N/A", "N m/A", "N/V", "N m/V", "V s/m", "V s/rad", "N^2 s/m", "1/s", "V/rad", "N m^2"),
 )
 
 

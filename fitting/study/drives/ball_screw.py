@@ -31,7 +31,7 @@ rate = "4 kHz"
 type = "JerkLimitedMove"
 distance = "20 mm"
 velocity_limit = "0.3 m/s"
-acceleration_limit = "3 m/s^2"
+acceleration_limit = "2 m/s^2"
 jerk_limit = "60 m/s^3"
 start_time = "20 ms"
 

@@ -34,6 +34,7 @@ damping = { lower = "0 N m s/rad", upper = "1 N m s/rad" }
 [data.run1]
 file = "drive.mat"
 inputs = { command = "current" }                            # channel that drives the motor
+hold = true                     # the current is held from sample to sample; false: straight lines between samples
 
 [data.run1.channels]                                        # names on the left are those of the model
 current = { column = "i", unit = "A" }
@@ -44,12 +45,12 @@ load_position = { column = "phi_load", unit = "rad", from_zero = true }
 # [data.taps]
 # kind = "frf"
 # file = "response.csv"
-# band = ["5 Hz", "300 Hz"]
+# band = ["5 Hz", "300 Hz"]     # narrow it to the lines around antiresonance and resonance
 # outputs = { position = "phi_motor", load_position = "phi_load" }
 # inputs = { command = "i" }
 
 [fit]
-starts = 20                     # drawn between the bounds, as one batch
+starts = 1                      # more: drawn between the bounds, as one batch; begin with few, long records take time
 controls = true                 # predict data held back, and try shuffled data
 
 [frf]
@@ -69,6 +70,14 @@ outputs = ["frequency(1)", "damping(1)"]
 load_inertia = { from = "1e-3 kg m^2", to = "6e-3 kg m^2", count = 11 }
 
 [rank]
-outputs = ["frequency(1)", "damping(1)"]
-samples = 256
+outputs = ["max(shaft)", "last(load_position)"]
+samples = 64
+
+# From a measured frequency response alone, without a start: see [data.taps] above.
+# [identify]
+# procedure = "two_mass"
+# data = "taps"
+# motor = "phi_motor"           # measured names
+# load = "phi_load"
+# excitation = "i"
 """

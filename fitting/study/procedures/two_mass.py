@@ -7,19 +7,25 @@ load = "load_angle"
 excitation = "current"
 """
 
+import dataclasses
 from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
 
 from fitting.identification.two_mass import identify_two_mass, two_mass_response
+from fitting.result import FitResult
 from fitting.study.data import data_names
 from fitting.study.procedures._found import Found
 from fitting.study.responses import read_response
 from fitting.study.study_file import StudyFile
+from twin._checks import InputError
+from twin.drives import TwoMass
 from twin.frf import FRF
 from twin.io.toml_document import unknown
 from twin.io.toml_table import TomlTable
+from twin.parameters import ParameterSpace
+from twin.paths import set_leaves
 
 HELP = "inertias, stiffness, damping, frictions and dead time of a two-mass drive from its frequency responses"
 KEYS = ("motor", "load", "excitation", "residual", "data")
@@ -44,8 +50,21 @@ def run(study: StudyFile, table: TomlTable, out: Path) -> Found:
     motor, load = table.text("motor", measured.outputs[0]), table.text("load", measured.outputs[-1])
     excitation = table.text("excitation", measured.inputs[0])
     kind = table.text("residual", "log", choices=("log", "complex"))
-    found = identify_two_mass(measured, kind=kind, motor=motor, load=load, excitation=excitation)
-    lines = [found.result.to_dataframe()[["unit", "estimate", "standard error", "remark"]].to_string()]
+    try:
+        found = identify_two_mass(measured, kind=kind, motor=motor, load=load, excitation=excitation)
+    except InputError as error:
+        raise InputError(
+            f"{error} Or narrow `band` of the data set to the lines around antiresonance and resonance."
+        ) from error
+    constant = _torque_constant(study)
+    result = found.result if constant is None else times_constant(found.result, constant)
+    told = (
+        "Inertias, stiffness, damping and frictions are in units of the torque constant: give [model] with its gain "
+        "where the excitation is a current."
+        if constant is None
+        else f"Counted with the torque constant of the model, gain = {constant:g}."
+    )
+    lines = [result.to_dataframe()[["unit", "estimate", "standard error", "remark"]].to_string()]
     for quantity, estimate in found.modes._asdict().items():
         lines.append(
             f"{quantity.replace('_', ' '):16} {estimate.value:12.6g} ± {estimate.standard_error:.2g} {estimate.unit}"
@@ -62,8 +81,44 @@ def run(study: StudyFile, table: TomlTable, out: Path) -> Found:
     )
     fitted = FRF(measured.frequency, model.values, (motor, load), (excitation,), measured.form)
     summary = {
-        "parameters": {path: one._asdict() for path, one in found.result.estimates().items()},
+        "parameters": {path: one._asdict() for path, one in result.estimates().items()},
         "modes": {quantity: one._asdict() for quantity, one in found.modes._asdict().items()},
-        "status": found.result.message,
+        "status": result.message,
+        "torque_constant": constant,
     }
-    return Found("\n".join([*lines, found.result.message]), summary, found.result, {name: (shown, fitted)})
+    return Found("\n".join([*lines, told, result.message]), summary, result, {name: (shown, fitted)})
+
+
+def _torque_constant(study: StudyFile) -> float | None:
+    """Torque per unit of the excitation that the study's model says; None where it has no model."""
+    if "model" not in study.document.data:
+        return None
+    drive = getattr(study.model, "plant", study.model)
+    return float(drive.gain) if isinstance(drive, TwoMass) else None
+
+
+def times_constant(result: FitResult, constant: float) -> FitResult:
+    """A fit in units of the torque constant, in SI.
+
+    Args:
+        result: fit of a two-mass drive behind a dead time, with a gain of one.
+        constant: the torque constant.
+
+    Raises:
+        InputError: a constant that is not positive.
+    """
+    if not constant > 0:
+        raise InputError(f"gain must be positive, but is {constant:g}. Turn the sign of the excitation round.")
+    values, scaled, parameters = result.values.copy(), result.scaled.copy(), []
+    for i, parameter in enumerate(result.space.parameters):
+        if parameter.path == "delay":
+            parameters.append(parameter)
+            continue
+        values[i] *= constant
+        scaled[i] += np.log(constant) if parameter.scale == "log" else 0.0
+        size = None if parameter.size is None else constant * parameter.size
+        bounds = {"lower": constant * parameter.lower, "upper": constant * parameter.upper}
+        parameters.append(dataclasses.replace(parameter, size=size, **bounds))
+    space = ParameterSpace(parameters)
+    model = space.with_values(set_leaves(result.model, {"plant.gain": constant}), jnp.asarray(values))
+    return dataclasses.replace(result, values=values, scaled=scaled, space=space, model=model)

@@ -168,6 +168,7 @@ def test_identify_two_masses_from_a_response_file(tmp_path, capsys):
     text = """
 [model]
 type = "TwoMass"
+gain = "0.5 N m/A"
 motor_inertia = "1 kg m^2"
 load_inertia = "1 kg m^2"
 stiffness = "1 N m/rad"
@@ -185,7 +186,13 @@ load = "load_position"
     assert main(["identify", write_study(tmp_path, text), "--out", str(tmp_path / "out"), "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
     found = {path: one["value"] for path, one in summary["parameters"].items()}
-    # Without the torque constant everything is in units of it.
-    assert found["plant.stiffness"] == pytest.approx(130.0 / 0.5, rel=1e-3)
-    assert found["plant.load_inertia"] == pytest.approx(4.1e-3 / 0.5, rel=1e-3)
+    assert found["plant.stiffness"] == pytest.approx(130.0, rel=1e-3)
+    assert found["plant.load_inertia"] == pytest.approx(4.1e-3, rel=1e-3)
+    assert summary["torque_constant"] == 0.5
+    # Without a model nobody knows the torque constant, and everything is in units of it.
+    bare = text[text.index("[data.sweep]") :]
+    study = write_study(tmp_path, bare, "bare.toml")
+    assert main(["identify", study, "--out", str(tmp_path / "bare"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["parameters"]
+    assert found["plant.stiffness"]["value"] == pytest.approx(130.0 / 0.5, rel=1e-3)
     assert (tmp_path / "out" / "report.html").exists()

@@ -33,6 +33,7 @@ def test_fit_finds_the_truth(fitted):
         assert low < one["value"] < high
         assert one["verdict"] == "identified"
     assert 0.9 < summary["rms"] < 1.1
+    assert summary["warnings"] == []
     assert all(control["passed"] for control in summary["controls"])
     assert len(summary["controls"]) == 2
     assert "jax" in summary["versions"]

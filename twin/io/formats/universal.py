@@ -61,7 +61,7 @@ def read(file: Path, limit: int, *, units: dict[int, str] | None = None) -> tupl
             raise InputError(f"Universal file {str(file)!r} has a damaged dataset {i + 1}. Export it again.")
         channels.append(_channel(one, i + 1, file, units or {}, remarks))
     if any(channel.abscissa == "frequency" for channel in channels):
-        remarks.append("Frequency responses are read as one object by twin.io.frf_uff.read_frf_uff.")
+        remarks.append("Frequency responses: drivetwin modes FILE finds their modes.")
     return channels, list(dict.fromkeys(remarks))
 
 

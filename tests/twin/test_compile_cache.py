@@ -200,6 +200,6 @@ def test_the_command_line_uses_the_users_cache(fresh, tmp_path, monkeypatch):
     from fitting import cli
 
     monkeypatch.setattr(compile_cache, "user_cache", lambda: tmp_path / "cache")
-    monkeypatch.setattr(cli, "_demo", lambda out: str(jax.config.jax_compilation_cache_dir))
+    monkeypatch.setattr("fitting.rack_pinion_demo.run_demo", lambda out: str(jax.config.jax_compilation_cache_dir))
     assert cli.main(["demo", "--out", str(tmp_path / "out")]) == 0
     assert Path(jax.config.jax_compilation_cache_dir).parent == tmp_path / "cache" / "compiled"

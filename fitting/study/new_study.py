@@ -14,7 +14,13 @@ from twin.io.toml_document import unknown
 
 _EXAMPLE = r"^\[data\.(\w+)\]\n(.*?)(?=\n\n)\n\n\[data\.\1\.channels\][^\n]*\n(.*?)(?=\n\n)"
 # What a look at a file calls a channel, and what the examples call it.
-_ALIASES = {"position_setpoint": "set", "current": "command", "voltage": "command", "torque": "command"}
+_ALIASES = {
+    "position_setpoint": "set",
+    "current": "command",
+    "voltage": "command",
+    "torque": "command",
+    "position_2": "load_position",
+}
 
 
 def known_drives() -> dict[str, Any]:

@@ -1,14 +1,12 @@
 """The page: a report as one HTML file that needs nothing else."""
 
-import os
 import re
-import tempfile
 from pathlib import Path
 
 from fitting.report.colours import variables
 from fitting.report.content import Figure, Report, Section
 from fitting.report.drawing import drawn
-from twin._checks import InputError
+from twin.io._whole_file import whole_file
 
 _HERE = Path(__file__).parent
 
@@ -26,20 +24,9 @@ def write_report(path: str | Path, report: Report) -> Path:
     Raises:
         InputError: the folder does not exist.
     """
-    target = Path(path)
-    if not target.parent.is_dir():
-        raise InputError(f"The folder {target.parent} of the report does not exist. Make it first.")
-    page = page_of(report)
-    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", errors="replace", newline="\n") as file:
-            file.write(page)
-        os.chmod(name, 0o644)
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-    return target
+    with whole_file(path) as temporary:
+        temporary.write_text(page_of(report), encoding="utf-8", errors="replace", newline="\n")
+    return Path(path)
 
 
 def page_of(report: Report) -> str:

@@ -6,7 +6,6 @@ from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 
 from fitting.residuals.frequency_response import FrequencyResponseResidual
 from fitting.residuals.losses import HuberLoss
@@ -145,11 +144,19 @@ def simulate_record(model: Any, one: RecordData) -> Trajectory:
         one: the record.
     """
     started = set_leaves(model, dict(one.initial)) if one.initial else model
-    return _simulated(started, one.reference, one.record.times, one.stepping)
+    return simulated(started, one.reference, one.record.times, one.stepping)
 
 
 @eqx.filter_jit
-def _simulated(model: Any, reference: Any, times: Any, stepping: Any) -> Trajectory:
+def simulated(model: Any, reference: Any, times: Any, stepping: AbstractStepping | None) -> Trajectory:
+    """`simulate`, compiled once for each structure of the model.
+
+    Args:
+        model: as the system of `simulate`.
+        reference: as there.
+        times: as there [s].
+        stepping: as there.
+    """
     return simulate(model, reference, times, stepping=stepping)
 
 
@@ -162,15 +169,3 @@ def status_of(trajectory: Trajectory) -> str:
     if trajectory.status == SimulationStatus.successful:
         return ""
     return str(SimulationStatus[trajectory.status])
-
-
-def relative_error(measured: Any, simulated: Any) -> float:
-    """Root mean square of the difference over that of the measured channel about its mean [-].
-
-    Args:
-        measured: samples.
-        simulated: samples.
-    """
-    measured, simulated = np.asarray(measured), np.asarray(simulated)
-    spread = np.sqrt(np.mean((measured - measured.mean()) ** 2))
-    return float(np.sqrt(np.mean((measured - simulated) ** 2)) / spread) if spread > 0 else float("nan")

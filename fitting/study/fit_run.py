@@ -16,6 +16,7 @@ import numpy as np
 
 from fitting.commands._outcome import Outcome
 from fitting.controls import Control, held_back, held_back_share, permuted_control
+from fitting.controls.relative_error import relative_error
 from fitting.fit import fit
 from fitting.identifiability import IdentifiabilityReport, identifiability
 from fitting.multistart import MultistartResult, multistart
@@ -26,7 +27,6 @@ from fitting.study.evidence import (
     StudyData,
     evidence_of,
     read_data,
-    relative_error,
     simulate_record,
     status_of,
 )
@@ -202,8 +202,8 @@ def summary_of(found: FitRun) -> dict[str, Any]:
     }
     errors = {
         one.name: {
-            channel: relative_error(one.record.channel(channel), found.simulated[one.name][channel])
-            for channel in one.deviation
+            channel: relative_error(measured, measured - found.simulated[one.name][channel])
+            for channel, measured in ((name, np.asarray(one.record.channel(name))) for name in one.deviation)
         }
         for one in found.data.records
     }

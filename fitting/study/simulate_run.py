@@ -3,20 +3,17 @@
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
 import numpy as np
 
 from fitting.commands._outcome import Outcome
 from fitting.report.content import Figure, Section
-from fitting.study.evidence import status_of
+from fitting.study.evidence import simulated, status_of
 from fitting.study.motion import Motion, read_motion
 from fitting.study.run_report import write_run_report
 from fitting.study.study_file import StudyFile
 from fitting.study.units_of_outputs import output_units
 from fitting.study.written import write_run
 from twin.export.trajectory import write_trajectory
-from twin.simulation import simulate
-from twin.trajectory import Trajectory
 
 
 def run_simulate(study: StudyFile, out: Path) -> Outcome:
@@ -30,21 +27,21 @@ def run_simulate(study: StudyFile, out: Path) -> Outcome:
         InputError: see `read_motion`.
     """
     motion = read_motion(study)
-    trajectory = _simulated(motion.model, motion.reference, motion.times, study.stepping)
+    trajectory = simulated(motion.model, motion.reference, motion.times, study.stepping)
     problem = status_of(trajectory)
     units = output_units(study)
     channels = {name: np.asarray(trajectory.channel(name)) for name in trajectory.outputs._fields}
     known = {name: unit for name, unit in units.items() if unit}
     for name in () if problem else ("trajectory.csv", "trajectory.h5"):
         write_trajectory(out / name, trajectory, units=known)
-    _draw(out / "simulation.png", study.title, motion, channels, units)
+    moving = [name for name, values in channels.items() if np.ptp(values) > 0] or list(channels)
+    _draw(out / "simulation.png", study.title, moving, motion, channels, units)
     ranges = {
         name: {"unit": units[name], "min": float(values.min()), "max": float(values.max()), "last": float(values[-1])}
         for name, values in channels.items()
     }
     summary = {"status": problem or "successful", "samples": len(motion.times), "channels": ranges}
     write_run(study, out, "simulate", summary)
-    moving = [name for name, values in channels.items() if np.ptp(values) > 0] or list(channels)
     figure = Figure(
         lambda axes: _panels(axes, moving, motion, channels, units),
         f"Simulated {', '.join(moving)} over time.",
@@ -64,17 +61,13 @@ def run_simulate(study: StudyFile, out: Path) -> Outcome:
     return Outcome(text.replace("\n\n", "\n"), summary, code=1 if problem else 0)
 
 
-@eqx.filter_jit
-def _simulated(model: Any, reference: Any, times: Any, stepping: Any) -> Trajectory:
-    return simulate(model, reference, times, stepping=stepping)
-
-
-def _draw(file: Path, title: str, motion: Motion, channels: dict[str, np.ndarray], units: dict[str, str]) -> None:
+def _draw(
+    file: Path, title: str, moving: list[str], motion: Motion, channels: dict[str, np.ndarray], units: dict[str, str]
+) -> None:
     from matplotlib import pyplot
 
     from fitting.plots import save_figure
 
-    moving = [name for name, values in channels.items() if np.ptp(values) > 0] or list(channels)
     figure, axes = pyplot.subplots(
         len(moving), 1, figsize=(8, 1.2 + 1.5 * len(moving)), layout="constrained", sharex=True, squeeze=False
     )

@@ -1,5 +1,6 @@
 """Suspicious spots of one channel, and of its clock."""
 
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ _FEW_LEVELS = 64
 _MAINS = (50.0, 60.0)
 _HUM = 30.0
 _LARGEST = 2_000_000
+_ANGLE = re.compile(r"winkel|angle|theta|phi|rot", re.IGNORECASE)
 # Beyond these a value in SI is unlikely for a feed drive; the unit that would be likely instead.
 _UNLIKELY = {
     ("position", "m"): (20.0, "mm"),
@@ -64,8 +66,8 @@ def clock_findings(channel: MeasuredChannel) -> list[Finding]:
             Finding(
                 name,
                 "gap",
-                f"{gaps.size} gaps, the longest of {steps[longest]:.4g} s after {times[longest]:.6g} s. Say how to "
-                "treat them by gaps (refuse, fill, longest).",
+                f"{gaps.size} gap{'s' * (gaps.size > 1)}, the longest of {steps[longest]:.4g} s after "
+                f"{times[longest]:.6g} s. Say how to treat them by gaps (refuse, fill, longest).",
             )
         )
     elif gaps.size:
@@ -190,6 +192,8 @@ def _unit(values: np.ndarray, span: float, channel: MeasuredChannel) -> tuple[st
     size = span if role == "position" else float(np.max(np.abs(values)))
     if size <= limit[0]:
         return None
+    if role == "position" and not channel.unit and _ANGLE.search(channel.name):
+        limit = (limit[0], "deg")
     unit = f" {channel.unit}" if channel.unit else ""
     return "unit", f"spans {span:.4g}{unit}, much for a {role} of a drive: is it in {limit[1]}?"
 

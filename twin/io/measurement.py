@@ -88,13 +88,18 @@ class Measurement:
         return tuple(channel.name for channel in self.channels)
 
     def __getitem__(self, name: str) -> MeasuredChannel:
-        """One channel by name.
+        """One channel by name, or by its heading in the file, such as "phi [deg]".
 
         Raises:
             InputError: if there is none of that name; the closest come first in the message.
         """
+        from twin.io.formats._shared import is_called  # the formats themselves import this module
+
         for channel in self.channels:
             if channel.name == name:
+                return channel
+        for channel in self.channels:
+            if is_called(name, channel.name, channel.unit):
                 return channel
         raise InputError(
             f"{self.source!r} has no channel {name!r}; it has {listed(name, self.names)}. Use one of these names."

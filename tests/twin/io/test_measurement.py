@@ -196,3 +196,24 @@ def test_sep005_both_ways():
     ):
         with pytest.raises(InputError, match=told):
             from_sep005(bad)
+
+
+@pytest.mark.parametrize(
+    ("written", "name", "unit"),
+    [
+        ("phi_Motor [deg]", "phi_Motor", "deg"),
+        ("n [1/min]", "n", "1/min"),
+        ("i_q (A)", "i_q", "A"),
+        ("x(t)", "x(t)", ""),
+        ("a[0]", "a[0]", ""),
+        ("n [left]", "n [left]", ""),
+    ],
+)
+def test_unit_in_the_name_of_a_channel(tmp_path, written, name, unit):
+    signals = np.zeros((1, 2), dtype=[("values", "O"), ("label", "O")])
+    signals[0, 0], signals[0, 1] = (np.arange(5.0), written), (np.ones(5), "other")
+    file = tmp_path / "scope.mat"
+    scipy.io.savemat(file, {"scope": {"time": np.arange(5.0), "signals": signals}})
+    found = read_measurement(file)
+    assert (found[name].unit, found.names) == (unit, (name, "other"))
+    assert found[written] is found[name]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from twin._checks import InputError
-from twin.io.formats._shared import Column
+from twin.io.formats._shared import Column, is_called
 from twin.io.measurement import MeasuredChannel, listed
 from twin.io.units import to_si
 
@@ -91,7 +91,7 @@ def _find(
     real = [column for column in columns if column.values.dtype.kind == "f"]
     if time is not None:
         for column in real:
-            if column.name == time:
+            if is_called(time, column.name, column.unit):
                 return column, "frequency" if _of_dimension(column.unit, "Hz") else "time"
         names = tuple(column.name for column in real)
         raise InputError(f"{str(file)!r} has no time column {time!r}; it has {listed(time, names)}. Correct the name.")

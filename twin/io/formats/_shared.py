@@ -36,13 +36,28 @@ def as_column(name: str, values: Any, unit: Any = "") -> Column:
     """A column with its numbers in double precision and a name that can be printed.
 
     Args:
-        name: its name in the file.
+        name: its name in the file; a unit in brackets at its end, "phi [deg]", is taken where there is no other.
         values: real or complex numbers; flattened.
         unit: its unit in the file, as text or bytes; anything else is none.
     """
     array = np.asarray(values).ravel()
     array = array.astype(np.complex128 if array.dtype.kind == "c" else np.float64)
-    return Column(printable(name), array, printable(unit))
+    name, unit = printable(name), printable(unit)
+    bracketed = None if unit else re.fullmatch(r"(.*\S)(?:[\s_]*\[|\s+\()((?!\d+[\])])[^\[\]()]+)[\])]", name)
+    if bracketed and looks_like_unit(bracketed[2]):
+        name, unit = bracketed[1].rstrip("_"), _plain(bracketed[2].strip())
+    return Column(name, array, unit)
+
+
+def is_called(wanted: str, name: str, unit: str) -> bool:
+    """Whether a channel is meant: by its name, or by the heading of name and unit that the file has.
+
+    Args:
+        wanted: what was asked for.
+        name: the channel's name.
+        unit: its unit in the file.
+    """
+    return wanted == name or (bool(unit) and split_unit(wanted) == (name, unit))
 
 
 def columns_of(
@@ -61,6 +76,7 @@ def columns_of(
     name = printable(name)
     if values.ndim < 2 or max(values.shape) == values.size:
         return [as_column(name, values, unit)]
+    name, _, unit = as_column(name, (), unit)
     table = values.reshape(values.shape[0], -1)
     table = table.T if table.shape[0] < table.shape[1] else table
     if table.shape[1] > _WIDEST:

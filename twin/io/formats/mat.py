@@ -145,7 +145,7 @@ def _simulink(name: str, value: dict[str, Any]) -> list[MeasuredChannel]:
     for label, values, unit in found:
         if isinstance(values, np.ndarray) and values.size > 1:
             for column in _vectors(label, np.squeeze(values), []):
-                channels.append(_channel(as_column(column.name, column.values, unit or ""), times))
+                channels.append(_channel(as_column(column.name, column.values, unit or column.unit), times))
     return channels
 
 

@@ -47,9 +47,9 @@ def modal_analysis(
     Modes are chosen without being asked: poles that stay in place from order to order (frequency within 1 %, damping
     within 5 %, MAC above 0.98) and that the responses need (information criterion), with up to 20 % of damping.
 
-    Responses are weighted by their variance if they have one. Without it the noise of each is taken to be the same at
-    all lines and is found from what the modes leave, so that errors hold where the modes explain all but noise;
-    neighbouring lines that err alike, as behind a window, are allowed for.
+    Responses are weighted by their variance if they have one. Without it the noise of each is found from what the modes
+    leave, the same at all lines or growing with the response where it does (`modal_noise`), so that errors hold where
+    the modes explain all but noise; neighbouring lines that err alike, as behind a window, are allowed for.
 
     Args:
         frf: responses to one or more excitations; several excitations tell modes of one frequency apart. Names that are

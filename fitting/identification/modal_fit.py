@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fitting.identification.modal_basis import ModalKind, modal_basis, shapes_of, solve_linear
+from fitting.identification.modal_noise import noise_deviation
 from fitting.identification.modal_poles import ModalPoles
 from fitting.identification.modal_refinement import ModalProblem, factored, refined
 from fitting.result import FitResult
@@ -43,8 +44,8 @@ def fit_modes(
 ) -> ModalFit:
     """Fit poles, participations, shapes and residual terms to responses.
 
-    Without a measured variance the noise of each response is taken to be the same at all lines, and is found in two
-    rounds from what the fit leaves.
+    Without a measured variance the noise of each response is found from what a first fit leaves (`modal_noise`): the
+    same at all lines, or growing with the response where it does.
 
     Args:
         frequency: lines [Hz].
@@ -64,8 +65,9 @@ def fit_modes(
     else:
         first = ModalProblem.of(frequency, values, rms, kind)
         model = refined(first, model, variance="estimated", max_steps=max_steps).model
-        left = first.linearised(model).residual.reshape(*values.shape[:2], -1)
-        used = np.maximum(rms * np.sqrt(np.mean(left**2, axis=2, keepdims=True)), _FLOOR * rms)
+        basis = modal_basis(frequency, model.poles, model.participations, kind)
+        response = np.einsum("ifk,ok->oif", basis, first.linearised(model).coefficients)
+        used = np.maximum(noise_deviation(values - response, response), _FLOOR * rms)
         problem = ModalProblem.of(frequency, values, used, kind)
         result = refined(problem, model, variance="estimated", max_steps=max_steps)
     model = result.model

@@ -1,5 +1,6 @@
 """Standard errors of measured modes hold what they say, and derivatives of the fit are right."""
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -7,6 +8,7 @@ from modal_systems import FREQUENCY, LINES, RATIO, response, shapes_for
 
 from fitting.identification.modal_analysis import modal_analysis
 from fitting.identification.modal_basis import ModalKind
+from fitting.identification.modal_noise import noise_deviation
 from fitting.identification.modal_poles import ModalPoles
 from fitting.identification.modal_refinement import ModalProblem
 
@@ -35,6 +37,38 @@ def test_intervals_hold_the_truth_as_often_as_they_say(known):
     assert np.sqrt(np.mean(np.square(scores))) == pytest.approx(1.0, abs=0.1)
     # Those of the scale and of the driving points' own rows hang together, which is not counted: on the safe side.
     assert 0.75 < np.sqrt(np.mean(np.square(shape_scores))) < 1.1
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_truth_where_noise_grows_with_the_response():
+    shapes, scores = shapes_for(6), []
+    for seed in range(SEEDS):
+        frf, _ = response(
+            FREQUENCY, RATIO, shapes, LINES[::2], inputs=(0, 1), form="accelerance", noise=0.002, seed=100 + seed
+        )
+        random = np.random.default_rng(seed)
+        scatter = random.standard_normal((2, *frf.values.shape)) * 0.02
+        analysis = modal_analysis(eqx.tree_at(lambda f: f.values, frf, frf.values * (1 + scatter[0] + 1j * scatter[1])))
+        assert analysis.frequency.size == 6
+        scores.append((analysis.frequency - FREQUENCY) / analysis.frequency_error)
+        scores.append((analysis.damping_ratio - RATIO) / analysis.damping_error)
+    assert 0.925 < np.mean(np.abs(scores) < 1.96) < 0.975
+    assert np.sqrt(np.mean(np.square(scores))) == pytest.approx(1.0, abs=0.1)
+
+
+def test_noise_of_both_kinds_is_told():
+    random = np.random.default_rng(3)
+    true, _ = response(FREQUENCY, RATIO, shapes_for(6))
+    true = np.asarray(true.values)
+    for even, growing in ((0.1, 0.0), (0.05, 0.03), (0.001, 0.02)):
+        size = np.sqrt(np.mean(np.abs(true) ** 2, axis=2, keepdims=True))
+        deviation = np.sqrt((even * size) ** 2 + (growing * np.abs(true)) ** 2)
+        noise = deviation * (random.standard_normal(true.shape) + 1j * random.standard_normal(true.shape))
+        found = noise_deviation(noise, true) / deviation
+        assert np.median(found) == pytest.approx(1.0, abs=0.05)
+        assert np.all((found > 0.5) & (found < 2.0))
+    np.testing.assert_allclose(np.ptp(noise_deviation(np.ones_like(true), true), axis=2), 0.0)
+    np.testing.assert_array_equal(noise_deviation(np.zeros_like(true), true), 0.0)
 
 
 def test_shapes_of_equal_noise_have_errors_of_equal_size():

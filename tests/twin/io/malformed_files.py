@@ -1,5 +1,6 @@
 """Files that no reader may trust, made in a folder: each must be refused, and none may run code or take memory."""
 
+import functools
 import os
 import pickle
 import struct
@@ -40,18 +41,15 @@ def _bytes(name: str, data: bytes) -> None:
     FILES[name] = lambda path: path.write_bytes(data)
 
 
-def _cut(name: str, kept: float) -> Callable[[Path], object]:
-    def write(path: Path) -> None:
-        whole = made.WRITERS[name](path.with_name(f"whole_{name}")).read_bytes()
-        path.write_bytes(whole[: int(kept * len(whole))])
-
-    return write
+def _cut(path: Path, name: str, kept: float) -> None:
+    whole = made.WRITERS[name](path.with_name(f"whole_{name}")).read_bytes()
+    path.write_bytes(whole[: int(kept * len(whole))])
 
 
 for _name in made.WRITERS:
     if not _name.endswith("csv"):
         for _kept in (0.1, 0.45, 0.93):
-            FILES[f"cut_{_kept}_{_name}"] = _cut(_name, _kept)
+            FILES[f"cut_{_kept}_{_name}"] = functools.partial(_cut, name=_name, kept=_kept)
 for _ending in ("csv", "mat", "uff", "h5", "tdms", "wav", "npz", "npy", "txt", "bin"):
     _bytes(f"noise.{_ending}", _NOISE)
     _bytes(f"empty.{_ending}", b"")
@@ -235,6 +233,27 @@ def _references(path: Path) -> None:
             del file[name]
         file["x"] = np.array([file.ref] * 3, dtype=h5py.ref_dtype)
         file["x"].attrs["matlab_class"] = np.bytes_("cell")
+
+
+def _broken_text(path: Path, which: int, declared: int) -> None:
+    with h5py.File(path, "w") as file:
+        file["x"], file["time"] = made.TIMES, made.TIMES
+        file["x"].attrs["unit"] = "m" * 29
+    whole = bytearray(path.read_bytes())
+    length = struct.pack("<I", 29)
+    at = whole.index(length, whole.index(length) + 1 if which else 0)
+    whole[at : at + 4] = struct.pack("<I", declared)
+    path.write_bytes(bytes(whole))
+
+
+@content("endless_heap.h5")  # libhdf5 2.0 never comes back
+def _endless_heap(path: Path) -> None:
+    _broken_text(path, 1, 200)
+
+
+@content("huge_text.h5")
+def _huge_text(path: Path) -> None:
+    _broken_text(path, 0, 0xFFFFFFF0)
 
 
 def _wav(

@@ -1,5 +1,8 @@
 """A walk through an HDF5 file that stays within it: nothing outside is opened, nothing is read beyond the limit."""
 
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -7,11 +10,41 @@ from typing import Any
 import numpy as np
 
 from twin._checks import InputError
+from twin.io.formats import _hdf5_probe
 from twin.io.formats._shared import check_room
 
 _DEEPEST, _MOST_OBJECTS = 24, 100_000
 # Filters that are built in: deflate, shuffle, Fletcher-32, szip, n-bit, scale-offset, LZF. Others would load code.
 _FILTERS = frozenset({1, 2, 3, 4, 5, 6, 32000})
+
+
+# A first reading may take so many seconds, and one more for so many bytes of the file.
+_PATIENCE, _RATE = 10.0, 20e6
+
+
+def _probe(file: Path, limit: int) -> None:
+    """Have the file read by a process of its own first.
+
+    Raises:
+        InputError: if that crashes, comes to no end or needs more memory than may be read.
+    """
+    if not sys.executable:  # embedded in another program
+        return
+    script = Path(_hdf5_probe.__file__)
+    surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "OPENBLAS_NUM_THREADS": "1"}
+    damaged = f"{str(file)!r} is damaged: the HDF5 library"
+    try:
+        done = subprocess.run(
+            [sys.executable, "-P", str(script), str(file), str(limit)],
+            env=surroundings, stdin=subprocess.DEVNULL, capture_output=True, check=False,
+            timeout=_PATIENCE + file.stat().st_size / _RATE,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired as error:
+        raise InputError(f"{damaged} does not come to an end with it. Export it again.") from error
+    if done.returncode == _hdf5_probe.TOO_LARGE:
+        raise InputError(f"{damaged} needs more memory for it than may be read. Export it again.")
+    if done.returncode < 0:
+        raise InputError(f"{damaged} breaks down over it (signal {-done.returncode}). Export it again.")
 
 
 class SafeHdf5:
@@ -25,6 +58,7 @@ class SafeHdf5:
         self.used = 0
         self.left_out: list[str] = []
         self._visited: set[int] = set()
+        _probe(file, limit)
         try:
             self.file = h5py.File(file, "r", locking=False)
         except OSError as error:

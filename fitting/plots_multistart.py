@@ -38,7 +38,7 @@ def plot_waterfall(result: MultistartResult, *, ax: "Axes | None" = None) -> "Ax
         ax.plot([rank[int(i)] for i in members], above[members] + floor, ls="none", label=label, **style)
     ax.set_yscale("log")
     ax.set_xlabel("start, in order of its cost")
-    ax.set_ylabel(f"cost above the best + {floor:.0e} [-]")
+    ax.set_ylabel(f"cost above the best [-],\ndrawn from {floor:.0e} up")
     failed = int(np.sum(~finite))
     ax.set_title(f"best cost {lowest:.5g}, {_counted(failed, len(finite))}" if order.size else "all starts failed")
     _finish(ax, order.size)

@@ -12,7 +12,10 @@ HELP = "modes: of a study's model, or measured ones from frequency responses (a 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument(
-        "file", type=Path, metavar="FILE", help="study file (.toml), or frequency responses such as a universal file"
+        "file",
+        type=Path,
+        metavar="FILE",
+        help="study file (.toml), folder of a fit, or frequency responses such as a universal file",
     )
     parser.add_argument("--band", nargs=2, type=float, metavar=("LOW", "HIGH"), help="frequencies to look at [Hz]")
     add_out(parser, "out/modes")
@@ -20,6 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Outcome:
     """Modes of a model, or measured ones."""
+    fitted = options.file / "fitted.toml"
+    if fitted.is_file():
+        options.file = fitted
     if options.file.suffix.lower() == ".toml":
         from fitting.commands._study_run import run_study
         from fitting.study.modes_run import run_modes

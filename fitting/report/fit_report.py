@@ -46,6 +46,7 @@ def fit_report(
     ranking: SobolIndices | DerivativeMeasures | None = None,
     controls: Sequence[Control] = (),
     remarks: Mapping[str, Sequence[str]] | None = None,
+    warnings: Sequence[str] = (),
     more: Sequence[Section] = (),
     stamp: str = "",
 ) -> Report:
@@ -67,6 +68,7 @@ def fit_report(
         ranking: sensitivity study, `SobolIndices` or `DerivativeMeasures`.
         controls: controls of the fit, from `fitting.controls`.
         remarks: remarks on the preparation of each record.
+        warnings: what else a reader has to know before all else; follows what the fit itself warns of.
         more: further sections, for the end of the page.
         stamp: when the report was made; the page holds no other time.
 
@@ -90,8 +92,9 @@ def fit_report(
     return Report(
         title=title,
         asked=asked_section(asked, result.space),
-        warnings=tuple(
-            warnings_of(result, identifiability=identifiability, many=many, residuals=residuals, controls=controls)
+        warnings=(
+            *warnings_of(result, identifiability=identifiability, many=many, residuals=residuals, controls=controls),
+            *warnings,
         ),
         sections=(*sections, *more),
         facts=_facts(result, controls),

@@ -17,6 +17,8 @@ _LAGS = 60
 _MEMORY = 0.3
 _RMS = (0.5, 2.0)
 _CLOSE = 0.95
+# A correlation does no harm to estimates with a standard error below this share of them.
+_WELL_KNOWN = 0.01
 _FEW = 3
 
 
@@ -82,13 +84,24 @@ def _parameters(result: FitResult, report: IdentifiabilityReport | None) -> list
             f"Only a combination of {', '.join(group)} is known. Hold all but one, give a prior, or measure what tells "
             "them apart."
         )
-    close = [p for p in close_pairs(result) if abs(p[2]) > _CLOSE and not any({p[0], p[1]} <= set(g) for g in groups)]
+    uncertain = set(_uncertain(result))
+    close = [
+        (a, b, value)
+        for a, b, value in close_pairs(result)
+        if abs(value) > _CLOSE and {a, b} & uncertain and not any({a, b} <= set(group) for group in groups)
+    ]
     if close:
         pairs = "; ".join(f"{a} and {b} ({value:.2f})".replace("-", "−") for a, b, value in close)
         found.append(
             f"Closely correlated estimates: {pairs}. Use them together only, or measure what tells them apart."
         )
     return found
+
+
+def _uncertain(result: FitResult) -> list[str]:
+    """Paths of the estimates that are not known well, each for itself."""
+    known = np.abs(result.standard_errors) <= _WELL_KNOWN * np.abs(result.values)
+    return [path for path, well in zip(result.space.paths, known, strict=True) if not well]
 
 
 def _starts(many: MultistartResult | None) -> list[str]:
@@ -115,11 +128,11 @@ def _size(result: FitResult) -> list[str]:
         return []
     if rms > 1:
         return [
-            f"What is left over is {rms:.3g} times the standard deviations given. Either these are too small, or the "
+            f"What is left over is {rms:.3g} times the standard deviations taken. Either these are too small, or the "
             "model lacks something: look at the shape of the residuals."
         ]
     return [
-        f"What is left over is only {rms:.2g} times the standard deviations given. These are too large, or the model "
+        f"What is left over is only {rms:.2g} times the standard deviations taken. These are too large, or the model "
         "has so much freedom that it follows the noise: take the deviations from repeated records."
     ]
 

@@ -18,7 +18,7 @@ class Stop(eqx.Enumeration):
     not_finite = (
         "The residual or its Jacobian is not finite at the start. Simulate the start model and look at its status."
     )
-    too_many_steps = "Out of steps. Raise max_steps, or start closer: the waterfall of a few starts tells which."
+    too_many_steps = "Out of steps: it was still on its way. Raise max_steps, or go on from where it stopped."
     infeasible = (
         "No point near here satisfies the constraints: this is the least infeasible point found. Check the constraints "
         "against each other and against the bounds, or start elsewhere."

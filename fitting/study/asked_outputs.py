@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from fitting.study.data import output_names
+from fitting.study.channels import output_names
 from fitting.study.motion import read_motion
 from fitting.study.outputs import AskedOutputs, parse_outputs
 from fitting.study.study_file import StudyFile

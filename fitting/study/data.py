@@ -16,6 +16,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from fitting.study.channels import channel_of, compared_channels, unused_channels
 from fitting.study.noise import noise_deviation
 from fitting.study.study_file import StudyFile
 from twin._checks import InputError
@@ -51,6 +52,10 @@ class RecordData:
     """Standard deviation of the noise of each channel compared, SI."""
     remarks: tuple[str, ...]
     """What was assumed or changed on the way."""
+    noise_read: tuple[str, ...] = ()
+    """Channels whose noise nobody gave: it was read from the record."""
+    warnings: tuple[str, ...] = ()
+    """What was probably not meant so."""
     stepping: AbstractStepping | None = None
     """How time is stepped along it; None for what suits the model."""
 
@@ -70,12 +75,14 @@ def read_record(study: StudyFile, name: str) -> RecordData:
     record, remarks = _measured(table, name)
     reference = _reference(study, table, record)
     initial = _initial(study, table, record)
-    compared = _compared(study, table, record, reference)
-    deviation = {}
+    compared = compared_channels(study, table, record, reference)
+    warnings = () if "compare" in table else unused_channels(study, table, record, compared)
+    deviation, read = {}, []
     for channel in compared:
         options = table.data["channels"].get(channel, {})
         written = options.get("deviation") if isinstance(options, dict) else None
         if written is None:
+            read.append(channel)
             deviation[channel] = noise_deviation(np.asarray(record.channel(channel)))
             remarks.append(
                 f"{name}: noise of {channel} read from the record itself, {deviation[channel]:.3g} "
@@ -83,7 +90,7 @@ def read_record(study: StudyFile, name: str) -> RecordData:
             )
             continue
         unit = record.units[channel]
-        quantity = _of_channel(table, channel, "deviation", lambda w=written, u=unit: parse_quantity(w, (u,)))
+        quantity = _ofchannel_of(table, channel, "deviation", lambda w=written, u=unit: parse_quantity(w, (u,)))
         deviation[channel] = quantity.value
         if not quantity.value > 0:
             raise study.document.error(
@@ -95,7 +102,7 @@ def read_record(study: StudyFile, name: str) -> RecordData:
             f"{name}: inputs are {'held from sample to sample' if held else 'straight between samples'}; "
             f"{'hold = false' if held else 'hold = true'} is for {'measured, continuous' if held else 'digital'} ones."
         )
-    return RecordData(name, record, reference, initial, deviation, tuple(remarks))
+    return RecordData(name, record, reference, initial, deviation, tuple(remarks), tuple(read), warnings)
 
 
 def data_names(study: StudyFile, kind: str) -> tuple[str, ...]:
@@ -189,12 +196,12 @@ def _reference(study: StudyFile, table: TomlTable, record: Record) -> AbstractRe
         written = table.data["reference"]
         if isinstance(written, dict):
             return build_model(study.document, (*table.key, "reference"), kind=AbstractReference)
-        channel = _channel(table, "reference", record, written)
+        channel = channel_of(table, "reference", record, written)
         return SampledReference(record.times, record.channel(channel))
     if "inputs" in table:
         if not isinstance(study.model, AbstractPlant):
             raise table.error("inputs", f"{type(study.model).__name__} takes none. Give `reference`, what it follows.")
-        named = {path: _channel(table, "inputs", record, channel) for path, channel in table.table("inputs").items()}
+        named = {path: channel_of(table, "inputs", record, channel) for path, channel in table.table("inputs").items()}
         return signal_of(table, study.model, record.times, {p: record.channel(c) for p, c in named.items()})
     return None
 
@@ -243,44 +250,7 @@ def _initial(study: StudyFile, table: TomlTable, record: Record) -> dict[str, fl
     return found
 
 
-def _compared(
-    study: StudyFile, table: TomlTable, record: Record, reference: AbstractReference | None
-) -> tuple[str, ...]:
-    outputs = output_names(study.model)
-    if "compare" in table:
-        names = tuple(_channel(table, "compare", record, one) for one in table.texts("compare"))
-        for name in names:
-            if name not in outputs:
-                raise table.error("compare", unknown("output", name, outputs))
-        return names
-    driven = set(table.table("inputs").values()) if "inputs" in table else {table.data.get("reference")}
-    found = tuple(name for name in record.channels if name in outputs and name not in driven)
-    if not found and reference is not None:
-        raise table.error(
-            "channels",
-            f"none is named as an output of the model; these are {', '.join(outputs)}. Name the channels so.",
-        )
-    return found
-
-
-def output_names(model: Any) -> tuple[str, ...]:
-    """Names of what a model gives out.
-
-    Args:
-        model: a plant or a loop.
-    """
-    plant = model if isinstance(model, AbstractPlant) else model.plant
-    state, inputs = plant.initial_state(), plant.rest_inputs()
-    return jax.eval_shape(plant.outputs, jnp.zeros(()), state, inputs)._fields
-
-
-def _channel(table: TomlTable, name: str, record: Record, written: Any) -> str:
-    if not isinstance(written, str) or written not in record.channels:
-        raise table.error(name, unknown("channel", str(written), tuple(record.channels)))
-    return written
-
-
-def _of_channel(table: TomlTable, channel: str, name: str, make: Any) -> Any:
+def _ofchannel_of(table: TomlTable, channel: str, name: str, make: Any) -> Any:
     try:
         return make()
     except InputError as error:

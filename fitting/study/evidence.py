@@ -38,6 +38,11 @@ class StudyData:
         """What was assumed or changed on the way."""
         return tuple(remark for one in (*self.records, *self.responses) for remark in one.remarks)
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What was probably not meant so."""
+        return tuple(warning for one in self.records for warning in one.warnings)
+
     def only(self, names: Sequence[str]) -> "StudyData":
         """The data sets of some names.
 

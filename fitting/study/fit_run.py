@@ -2,6 +2,7 @@
 
 [fit]
 starts = 200                 # 1: from the values of the model alone
+max_steps = 300              # of each start
 hold_back = ["run2"]         # data sets that are predicted instead of fitted
 controls = true              # predict what was held back, and fit shuffled data
 correlated = true            # what is left over is a model error, not noise
@@ -31,13 +32,19 @@ from fitting.study.evidence import (
     status_of,
 )
 from fitting.study.fit_report import write_fit_report
-from fitting.study.shown import shown
+from fitting.study.lowered_noise import lowered_noise
+from fitting.study.shown import shown_estimates
 from fitting.study.study_file import StudyFile
 from fitting.study.written import versions, write_fitted, write_run
 from twin._checks import InputError
 from twin.frf import FRF
 from twin.io.parameter_file import ParameterEntry, write_parameters
 from twin.io.toml_document import unknown
+
+MAX_STEPS = 300
+"""Steps after which a fit is given up, where the study does not say."""
+# How often noise that was read from the records may turn out to be less.
+_ROUNDS = 2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,7 +91,8 @@ def run_fit(study: StudyFile, out: Path) -> Outcome:
     report, warnings = write_fit_report(study, found, out, versions=versions())
     summary["warnings"] = list(warnings)
     whole = write_run(study, out, "fit", summary)
-    return Outcome(_text(study, found, summary, report), whole, code=0 if result.success and not found.problems else 1)
+    trusted = result.success and not found.problems and all(control.passed for control in found.controls)
+    return Outcome(_text(study, found, summary, report), whole, code=0 if trusted else 1)
 
 
 def _entries(result: FitResult, source: str) -> list[ParameterEntry]:
@@ -116,10 +124,17 @@ def fit_study(study: StudyFile, out: Path | None = None) -> FitRun:
             raise table.error("hold_back", unknown("data set", name, names))
     if set(held) == set(names):
         raise table.error("hold_back", "names all data: nothing is left to fit.")
-    fitted_data = data.only([name for name in names if name not in held])
+    chosen = [name for name in names if name not in held]
     try:
-        evidence = evidence_of(fitted_data, study)
-        result, many = _fitted(study, evidence, fitted_data, out)
+        evidence = evidence_of(data.only(chosen), study)
+        result, many = _fitted(study, evidence, data.only(chosen), out)
+        for _ in range(_ROUNDS):
+            lowered = lowered_noise(data, chosen, result.model) if np.isfinite(result.cost) else None
+            if lowered is None:
+                break
+            data = lowered
+            evidence = evidence_of(data.only(chosen), study)
+            result = _fitted_once(study, evidence, result.model, data.only(chosen))
         verdicts = identifiability(result)
     except InputError as error:
         if str(study.document.file) in str(error):
@@ -150,28 +165,37 @@ def _fitted(
     study: StudyFile, evidence: AbstractResidual, data: StudyData, out: Path | None
 ) -> tuple[FitResult, MultistartResult | None]:
     table = study.table("fit", known=FIT_KEYS)
-    starts, steps = table.integer("starts", 1), table.integer("max_steps", 100)
-    # Each channel of each record is a series.
-    lengths = {one.record.times.size for one in data.records}
-    series = sum(len(one.deviation) for one in data.records)
-    correlated = series if table.flag("correlated", False) else None
-    if correlated and (len(lengths) != 1 or data.responses):
-        raise table.error(
-            "correlated", "needs records of one length and no frequency responses. Cut them by `start` and `stop`."
-        )
+    starts = table.integer("starts", 1)
     if starts == 1:
-        return fit(evidence, study.model, study.space, max_steps=steps, correlated=correlated), None
+        return _fitted_once(study, evidence, study.model, data), None
     many = multistart(
         evidence,
         study.model,
         study.space,
         starts=starts,
         seed=study.seed,
-        max_steps=steps,
-        correlated=correlated,
+        max_steps=table.integer("max_steps", MAX_STEPS),
+        correlated=_series(study, data),
         store=None if out is None else out / "store",
     )
     return many.best, many
+
+
+def _fitted_once(study: StudyFile, evidence: AbstractResidual, start: Any, data: StudyData) -> FitResult:
+    steps = study.table("fit", known=FIT_KEYS).integer("max_steps", MAX_STEPS)
+    return fit(evidence, start, study.space, max_steps=steps, correlated=_series(study, data))
+
+
+def _series(study: StudyFile, data: StudyData) -> int | None:
+    """How many series of correlated errors there are: each channel of each record is one; None for white errors."""
+    table = study.table("fit", known=FIT_KEYS)
+    if not table.flag("correlated", False):
+        return None
+    if len({one.record.times.size for one in data.records}) != 1 or data.responses:
+        raise table.error(
+            "correlated", "needs records of one length and no frequency responses. Cut them by `start` and `stop`."
+        )
+    return sum(len(one.deviation) for one in data.records)
 
 
 def _controls(study: StudyFile, evidence: AbstractResidual, held: StudyData, result: FitResult) -> tuple[Control, ...]:
@@ -231,8 +255,8 @@ def summary_of(found: FitRun) -> dict[str, Any]:
 
 
 def _text(study: StudyFile, found: FitRun, summary: dict[str, Any], report: Path) -> str:
-    table = found.result.to_dataframe()[["unit", "estimate", "standard error", "95 % from", "95 % to", "remark"]]
-    lines = [study.title, shown(table), found.result.message]
+    result = found.result
+    lines = [study.title, shown_estimates(result), result.message]
     if found.many is not None:
         lines.append(found.many.message)
     for name, errors in summary["relative_errors"].items():
@@ -241,5 +265,11 @@ def _text(study: StudyFile, found: FitRun, summary: dict[str, Any], report: Path
         lines.append(f"{name} ({role}), relative error: {told}")
     lines += [f"Control {c['name']}: {c['sentence']}" for c in summary["controls"]]
     lines += found.problems
+    if result.stop == "too_many_steps":
+        steps = study.table("fit", known=FIT_KEYS).integer("max_steps", MAX_STEPS)
+        lines.append(
+            f"Write max_steps = {4 * steps} into [fit] (it was {steps}), or go on from where it stopped: "
+            f"drivetwin fit {report.with_name('fitted.toml')}"
+        )
     lines += [f"Warning: {warning}" for warning in summary["warnings"]]
     return "\n".join([*lines, f"Report: {report}"])

@@ -8,18 +8,23 @@ from pathlib import Path
 from typing import Any
 
 from fitting.study import drives
+from fitting.study.channels import output_names
 from twin._checks import InputError
 from twin.io.model_text import model_text
 from twin.io.toml_document import unknown
 
 _EXAMPLE = r"^\[data\.(\w+)\]\n(.*?)(?=\n\n)\n\n\[data\.\1\.channels\][^\n]*\n(.*?)(?=\n\n)"
-# What a look at a file calls a channel, and what the examples call it.
+# What a look at a file calls a channel, and what the examples call it: the first that the example has.
 _ALIASES = {
-    "position_setpoint": "set",
-    "current": "command",
-    "voltage": "command",
-    "torque": "command",
-    "position_2": "load_position",
+    "position_setpoint": ("set",),
+    "current": ("command",),
+    "current_setpoint": ("current", "command"),
+    "voltage": ("command",),
+    "voltage_setpoint": ("command",),
+    "torque": ("command", "current"),
+    "torque_setpoint": ("command", "current"),
+    "position_2": ("load_position",),
+    "velocity_2": ("load_velocity",),
 }
 
 
@@ -53,11 +58,11 @@ def new_study(drive: str, *, data: Path | None = None, folder: Path | None = Non
     )
     rest = module.REST
     if data is not None:
-        rest = _with_channels(rest, data, folder or Path())
+        rest = _with_channels(rest, data, folder or Path(), output_names(module.model()))
     return head + model_text(module.model()) + rest
 
 
-def _with_channels(rest: str, data: Path, folder: Path) -> str:
+def _with_channels(rest: str, data: Path, folder: Path, outputs: tuple[str, ...]) -> str:
     """The example's channels replaced by those of a file."""
     from twin.io.look import look
     from twin.io.measurement import read_measurement
@@ -76,24 +81,26 @@ def _with_channels(rest: str, data: Path, folder: Path) -> str:
     except ValueError:  # on another drive of Windows
         there = data.resolve().as_posix()
     kept = [line for line in block.group(2).split("\n") if not line.startswith("file")]
-    example = re.findall(r"^(\w+) =", block.group(3), re.MULTILINE)
-    channels = _renamed(lines[lines.index(f"[data.{own}.channels]") + 1 :], example)
+    channels = _renamed(lines[lines.index(f"[data.{own}.channels]") + 1 :], block.group(3))
     times = [line for line in lines[1:] if line.startswith("time")]
     new = [f"[data.{block.group(1)}]", f'file = "{there}"', *times, *kept, ""]
-    new += [f"[data.{block.group(1)}.channels]        # names on the left must be those of the model:"]
+    new += [f"[data.{block.group(1)}.channels]        # names on the left must be those of the model's outputs:"]
+    new += [f"# {', '.join(outputs)}"]
     new += [f"# in the example: {line}" for line in block.group(3).split("\n")]
     return rest[: block.start()] + "\n".join([*new, *channels]) + rest[block.end() :]
 
 
-def _renamed(lines: list[str], example: list[str]) -> list[str]:
-    """The lines of a file's channels, those that the example has under another name renamed."""
+def _renamed(lines: list[str], example: str) -> list[str]:
+    """The lines of a file's channels, called as the example calls them and with what else it says of them."""
+    more = dict(re.findall(r"^(\w+) = \{.*?unit = \"[^\"]*\"(.*?) \}", example, re.MULTILINE))
+    kept = {name: re.sub(r", deviation = \"[^\"]*\"", "", options) for name, options in more.items()}
     taken = {line.split(" = ")[0] for line in lines}
     found = []
     for line in lines:
         name, equals, rest = line.partition(" = ")
-        alias = _ALIASES.get(name, "")
-        if name not in example and alias in example and alias not in taken:
-            name = alias
+        if name not in kept:
+            alias = next((one for one in _ALIASES.get(name, ()) if one in kept and one not in taken), name)
             taken.add(alias)
-        found.append(f"{name}{equals}{rest}")
+            name = alias
+        found.append(f"{name}{equals}{rest.replace(' }', kept.get(name, '') + ' }', 1)}")
     return found

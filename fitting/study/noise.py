@@ -6,7 +6,7 @@ import numpy as np
 _WEIGHT = np.sqrt(20.0)
 _NORMAL = 1.4826
 # What a channel without any scatter, a simulated one, is taken to scatter by, relative to its range.
-_LEAST = 1e-6
+LEAST = 1e-6
 
 
 def noise_deviation(values: np.ndarray) -> float:
@@ -23,4 +23,4 @@ def noise_deviation(values: np.ndarray) -> float:
     # Steps of a counter are all multiples of the smallest; noise has as many levels as samples.
     step = float(np.min(np.diff(levels))) if 1 < levels.size < values.size / 4 else 0.0
     spread = float(np.ptp(values))
-    return max(found, step / np.sqrt(12), _LEAST * spread, np.finfo(float).tiny)
+    return max(found, step / np.sqrt(12), LEAST * spread, np.finfo(float).tiny)

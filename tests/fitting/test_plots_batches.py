@@ -71,7 +71,7 @@ def test_waterfall():
         "not converged (1 start)",
     ]
     assert (ax.get_xlabel(), ax.get_yscale()) == ("start, in order of its cost", "log")
-    assert ax.get_ylabel() == "cost above the best + 2e-06 [-]"
+    assert ax.get_ylabel() == "cost above the best [-],\ndrawn from 2e-06 up"
     found = {line.get_label()[:9]: (list(line.get_xdata()), np.asarray(line.get_ydata())) for line in ax.lines}
     assert found["minimum 1"][0] == [1, 2] and found["not conve"][0] == [5]
     np.testing.assert_allclose(found["minimum 3"][1], 3.0 + 2e-6)
@@ -79,7 +79,7 @@ def test_waterfall():
 
 def test_waterfall_of_perfect_data_and_many_minima():
     exact = many([[100, 1]] * 3, [0.0, 1e-8, 1.0], [0, 1, 2])
-    assert plot_waterfall(exact).get_ylabel() == "cost above the best + 1e-11 [-]"
+    assert plot_waterfall(exact).get_ylabel() == "cost above the best [-],\ndrawn from 1e-11 up"
     crowd = many([[100, 1]] * 10, np.arange(1.0, 11.0), np.arange(10))
     assert legend(plot_waterfall(crowd))[-1] == "4 higher minima (4 starts)"
 

@@ -20,6 +20,7 @@ _UNITS = {
     "m": "position", "rad": "position", "m/s": "speed", "rad/s": "speed", "m/s^2": "acceleration",
     "rad/s^2": "acceleration", "A": "current", "V": "voltage", "N": "force", "N m": "torque", "K": "temperature",
 }  # fmt: skip
+_LOAD = re.compile(r"last|load|tisch|table|schlitten|slide|abtrieb", re.I)
 _SETPOINT = re.compile(r"soll|set|ref|cmd|command|target|demand", re.I)
 
 
@@ -40,6 +41,24 @@ def role_of(name: str, unit: str) -> str | None:
     if role is None:
         return None
     return f"{role}_setpoint" if _SETPOINT.search(own) else role
+
+
+def model_name(name: str, unit: str) -> str | None:
+    """What a model probably calls a channel, such as "velocity" or "load_position".
+
+    Args:
+        name: its name in the file.
+        unit: its unit in the file, or an empty text.
+
+    Returns:
+        The name; None if neither name nor unit tells.
+    """
+    role = role_of(name, unit)
+    if role is None:
+        return None
+    called = role.replace("speed", "velocity")
+    is_load = called in ("position", "velocity") and _LOAD.search(name.lower().rsplit("/", 1)[-1])
+    return f"load_{called}" if is_load else called
 
 
 def _si(unit: str) -> str:

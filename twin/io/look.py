@@ -9,7 +9,7 @@ import numpy as np
 from twin._checks import InputError
 from twin.io._look_channel import Finding, channel_findings, clock_findings
 from twin.io._look_pairs import pair_findings
-from twin.io._look_roles import role_of
+from twin.io._look_roles import model_name
 from twin.io._response_columns import named_responses
 from twin.io.measurement import MeasuredChannel, Measurement
 
@@ -153,7 +153,7 @@ def _study(measurement: Measurement) -> str:
     lines.append(f"[data.{name}.channels]")
     used: dict[str, int] = {}
     for one in chosen[:_MOST_ROWS]:
-        role = role_of(one.name, one.unit) or re.sub(r"[^A-Za-z0-9_-]+", "_", one.name).strip("_") or "channel"
+        role = model_name(one.name, one.unit) or re.sub(r"[^A-Za-z0-9_-]+", "_", one.name).strip("_") or "channel"
         used[role] = used.get(role, 0) + 1
         key = role if used[role] == 1 else f"{role}_{used[role]}"
         missing = "" if one.unit else "  # the file states no unit: fill it in"

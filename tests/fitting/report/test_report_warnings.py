@@ -50,7 +50,7 @@ def test_no_warning_where_all_is_well(good):
     ("changes", "said"),
     [
         ({"stop": "too_many_steps"}, ["did not converge", "max_steps"]),
-        ({"residual": 5 * NOISE[:40]}, ["times the standard deviations given", "look at the shape"]),
+        ({"residual": 5 * NOISE[:40]}, ["times the standard deviations taken", "look at the shape"]),
         ({"residual": 0.1 * NOISE[:40]}, ["is only", "take the deviations from repeated records"]),
         ({"warning": "A remark of the procedure."}, ["A remark of the procedure."]),
     ],

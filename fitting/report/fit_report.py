@@ -68,7 +68,7 @@ def fit_report(
         ranking: sensitivity study, `SobolIndices` or `DerivativeMeasures`.
         controls: controls of the fit, from `fitting.controls`.
         remarks: remarks on the preparation of each record.
-        warnings: what else a reader has to know before all else; follows what the fit itself warns of.
+        warnings: what a reader has to know even before what the fit itself warns of.
         more: further sections, for the end of the page.
         stamp: when the report was made; the page holds no other time.
 
@@ -93,8 +93,8 @@ def fit_report(
         title=title,
         asked=asked_section(asked, result.space),
         warnings=(
-            *warnings_of(result, identifiability=identifiability, many=many, residuals=residuals, controls=controls),
             *warnings,
+            *warnings_of(result, identifiability=identifiability, many=many, residuals=residuals, controls=controls),
         ),
         sections=(*sections, *more),
         facts=_facts(result, controls),

@@ -50,7 +50,7 @@ def write_fit_report(
         many=found.many,
         controls=found.controls,
         remarks=_by_data(found),
-        warnings=found.data.warnings,
+        warnings=(*found.hints, *found.data.warnings),
     )
     _draw(study, found, out)
     return write_report(out / "report.html", report), report.warnings

@@ -35,6 +35,7 @@ from fitting.study.fit_report import write_fit_report
 from fitting.study.lowered_noise import lowered_noise
 from fitting.study.shown import shown_estimates
 from fitting.study.study_file import StudyFile
+from fitting.study.timing import timing_hint
 from fitting.study.written import versions, write_fitted, write_run
 from twin._checks import InputError
 from twin.frf import FRF
@@ -69,6 +70,8 @@ class FitRun:
     """Simulations that did not succeed, each in a sentence."""
     held: tuple[str, ...]
     """Names of the data sets held back."""
+    hints: tuple[str, ...] = ()
+    """What the data would fit better with."""
 
 
 def run_fit(study: StudyFile, out: Path) -> Outcome:
@@ -135,6 +138,11 @@ def fit_study(study: StudyFile, out: Path | None = None) -> FitRun:
             data = lowered
             evidence = evidence_of(data.only(chosen), study)
             result = _fitted_once(study, evidence, result.model, data.only(chosen))
+        hints = timing_hint(
+            data.only(chosen),
+            result,
+            lambda other, start=result.model: _fitted_once(study, evidence_of(other, study), start, other),
+        )
         verdicts = identifiability(result)
     except InputError as error:
         if str(study.document.file) in str(error):
@@ -158,7 +166,7 @@ def fit_study(study: StudyFile, out: Path | None = None) -> FitRun:
             measured,
             FRF(measured.frequency, model.values[index], measured.outputs, measured.inputs, measured.form),
         )
-    return FitRun(data, result, many, verdicts, controls, simulated, responses, tuple(problems), held)
+    return FitRun(data, result, many, verdicts, controls, simulated, responses, tuple(problems), held, hints)
 
 
 def _fitted(

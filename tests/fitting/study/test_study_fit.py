@@ -2,10 +2,12 @@
 
 import json
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from fitting.cli import main
+from fitting.result import FitResult
 from fitting.study.study_file import read_study
 from tests.fitting.study.two_mass_study import FIT, MODEL, TRUTH, write_record, write_study
 from twin.io.parameter_file import read_parameters
@@ -71,6 +73,27 @@ def test_the_fitted_study_goes_on(fitted, capsys):
     exact = damped_modes(model.second_order())
     vibrating = np.asarray(exact.frequency)[np.asarray(exact.oscillating)]
     assert found[0]["frequency_Hz"] == pytest.approx(float(vibrating[0]), rel=1e-9)
+    ratio = found[0]["damping_ratio"]
+    assert found[0]["damped_frequency_Hz"] == pytest.approx(found[0]["frequency_Hz"] * np.sqrt(1 - ratio**2))
+    assert found[0]["frequency_error_Hz"] == pytest.approx(_carried_over(folder, model), rel=1e-3)
+    # A folder stands for the fit in it; a study that no fit wrote has no errors.
+    assert main(["modes", str(folder / "out"), "--out", str(folder / "modes2")]) == 0
+    assert " ± " in capsys.readouterr().out
+    assert main(["modes", str(folder / "study.toml"), "--out", str(folder / "modes3")]) == 0
+    assert " ± " not in capsys.readouterr().out
+
+
+def _carried_over(folder, model):
+    """√(J·Σ·Jᵀ) of the first frequency, by differences."""
+    fit = FitResult.load(folder / "out" / "fit.npz", model)
+
+    def frequency(values):
+        found = damped_modes(fit.space.with_values(model, jnp.asarray(values)).second_order())
+        return float(np.asarray(found.frequency)[np.asarray(found.oscillating)][0])
+
+    steps = np.diag(1e-5 * fit.values)
+    slopes = [(frequency(fit.values + h) - frequency(fit.values - h)) / (2 * h.max()) for h in steps]
+    return np.sqrt(slopes @ fit.covariance @ slopes)
 
 
 def test_fit_does_not_write_over_results(fitted, capsys):

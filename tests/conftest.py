@@ -1,9 +1,12 @@
 """Every test runs in double precision, with shapes and types checked at run time."""
 
+import gc
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import jax
+import pytest
 from jaxtyping import install_import_hook
 
 from twin._loop_option import make_small_loops_one_function
@@ -22,3 +25,23 @@ jax.config.update("jax_numpy_dtype_promotion", "standard")
 
 for _package in ("twin", "sensitivity", "fitting"):
     install_import_hook(_package, "beartype.beartype")
+
+_ROOM = 2.5e9
+"""Bytes of memory of a worker beyond which it forgets its compiled programs after a module."""
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _bounded_memory() -> Iterator[None]:
+    """Thousands of tests compile thousands of programs, which a worker would otherwise keep until its end."""
+    yield
+    if _resident() > _ROOM:
+        jax.clear_caches()
+        gc.collect()
+
+
+def _resident() -> float:
+    """Bytes of memory that this process holds; 0 where the system does not say."""
+    try:
+        return float(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError):
+        return 0.0

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from fitting.commands._out_folder import add_out, close_folder, open_folder
 from fitting.commands._outcome import Outcome
+from fitting.commands._ticking import ticking
 
 if TYPE_CHECKING:
     from fitting.study.study_file import StudyFile
@@ -37,6 +38,7 @@ def run_study(options: argparse.Namespace, run: "Callable[[StudyFile, Path], Out
 
     study = read_study(options.study)
     folder = open_folder(options.out, force=options.force)
-    outcome = run(study, folder)
+    with ticking(f"{study.title}: compiling and computing"):
+        outcome = run(study, folder)
     close_folder(folder)
     return outcome

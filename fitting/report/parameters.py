@@ -7,6 +7,9 @@ from fitting.report.content import Bar, Cell, Section, Table
 from fitting.report.numbers import given, plain, together, with_error
 from fitting.result import FitResult
 
+# A line may end before it, not after.
+_TOGETHER = "±\u00a0"
+
 
 def parameters_section(result: FitResult, identifiability: IdentifiabilityReport | None = None) -> Section:
     """Estimates with standard errors, intervals, their place within the bounds, and what the data say about each.
@@ -25,7 +28,7 @@ def parameters_section(result: FitResult, identifiability: IdentifiabilityReport
         rows.append(
             (
                 Cell(p.path, "name"),
-                Cell(with_error(value, error), "number"),
+                Cell(with_error(value, error).replace("± ", _TOGETHER), "number"),
                 Cell(p.unit or "–", "unit"),
                 Cell(together(ends, error, "{} … {}") if known else "–", "number"),
                 _bar(result, i),
@@ -64,6 +67,8 @@ def _bar(result: FitResult, i: int) -> Cell:
 def _verdict(result: FitResult, i: int, report: IdentifiabilityReport | None) -> Cell:
     if report is not None:
         verdict = report[result.space.paths[i]]
+        if verdict.kind == IDENTIFIED and result.active.any():
+            return Cell(f"{verdict.sentence}, what is at a bound held there")
         return Cell(verdict.sentence, "good" if verdict.kind == IDENTIFIED else "bad")
     if result.active[i]:
         return Cell("at a bound", "bad")

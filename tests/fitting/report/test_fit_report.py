@@ -93,7 +93,7 @@ def test_numbers_have_the_digits_of_their_errors(pieces, page):
     for path, estimate in pieces["result"].estimates().items():
         row = page[page.index("Estimates</figcaption>") :]
         row = row[row.index(path.replace("_", "_<wbr>")) :]
-        value, error = re.search(r">([0-9.]+) ± ([0-9.]+)<", row).groups()
+        value, error = re.search(r">([0-9.]+) ±\s([0-9.]+)<", row).groups()
         assert float(value) == pytest.approx(estimate.value, abs=0.06 * estimate.standard_error)
         assert float(error) == pytest.approx(estimate.standard_error, rel=0.06)
 

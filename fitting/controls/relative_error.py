@@ -10,6 +10,7 @@ from fitting.residuals.frequency_response import FrequencyResponseResidual
 from fitting.residuals.residual import AbstractResidual, JointResidual
 from fitting.residuals.robust import RobustResidual
 from fitting.residuals.selected import SelectedResidual
+from fitting.residuals.set_leaves import WithLeaves
 from fitting.residuals.trajectory import TrajectoryResidual
 from fitting.residuals.weighted import Weighted
 from twin.paths import get_part
@@ -46,6 +47,8 @@ def relative_errors(evidence: AbstractResidual, model: Any) -> dict[str, float]:
     if isinstance(evidence, SelectedResidual):
         inner = relative_errors(evidence.part, get_part(model, evidence.key))
         return {f"{evidence.key}: {name}": value for name, value in inner.items()}
+    if isinstance(evidence, WithLeaves):
+        return relative_errors(evidence.part, evidence.seen(model))
     if isinstance(evidence, RobustResidual):
         return relative_errors(evidence.part, model)
     if isinstance(evidence, Weighted):

@@ -6,11 +6,13 @@ import pytest
 
 from fitting.controls import held_back, held_back_share, hold_back
 from fitting.controls.held_back import rms_of
+from fitting.controls.relative_error import relative_errors
 from fitting.fit import fit
 from fitting.residuals.losses import HuberLoss
 from fitting.residuals.prior import GaussianPrior
 from fitting.residuals.residual import JointResidual
 from fitting.residuals.robust import RobustResidual
+from fitting.residuals.set_leaves import WithLeaves
 from fitting.residuals.weighted import Weighted
 from tests.fitting.controls.control_systems import (
     MODE_SPACE,
@@ -27,6 +29,7 @@ from tests.fitting.controls.control_systems import (
 from tests.fitting.curves import LineResidual
 from twin._checks import InputError
 from twin.parameters import Parameter, ParameterSpace
+from twin.paths import set_leaves
 
 TRUTH = Lag(2.0, 0.08)
 
@@ -126,3 +129,9 @@ def test_bad_shares_and_evidence(evidence):
         hold_back(evidence, share=0.01)
     with pytest.raises(InputError, match="neither a record nor a frequency response"):
         hold_back(LineResidual(TIMES, TIMES))
+
+
+def test_relative_errors_see_the_beginning_of_a_record(evidence):
+    started = WithLeaves(evidence, (jnp.asarray(1.3),), ("gain",))
+    assert relative_errors(started, START) == relative_errors(evidence, set_leaves(START, {"gain": 1.3}))
+    assert relative_errors(started, START) != relative_errors(evidence, START)

@@ -68,6 +68,7 @@ def fit_modes(
         basis = modal_basis(frequency, model.poles, model.participations, kind)
         response = np.einsum("ifk,ok->oif", basis, first.linearised(model).coefficients)
         used = np.maximum(noise_deviation(values - response, response), _FLOOR * rms)
+        model = ModalPoles.of(model.poles, model.participations)  # another excitation may drive a mode most
         problem = ModalProblem.of(frequency, values, used, kind)
         result = refined(problem, model, variance="estimated", max_steps=max_steps)
     model = result.model

@@ -74,8 +74,8 @@ def plot_synthesis(
 
     Args:
         analysis: the analysis.
-        response: name of the response.
-        excitation: name of the excitation.
+        response: name of the response in `analysis.measured`.
+        excitation: name of the excitation there.
         axes: two axes; new ones if not given.
 
     Returns:
@@ -106,7 +106,8 @@ def plot_synthesis(
     above.set_yscale("log")
     if np.any(size > 0):
         above.set_ylim(max(0.1 * size[size > 0].min(), 1e-5 * size.max()), 2 * size.max())
-    above.set_ylabel(f"|{response} / force {excitation}| [{_UNITS[analysis.measured.form]}]")
+    there, force = (excitation, response) if analysis.reciprocal else (response, excitation)
+    above.set_ylabel(f"|{there} / force {force}| [{_UNITS[analysis.measured.form]}]")
     above.legend(fontsize="small", ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
     below.set_ylabel("phase [°]")
     below.set_yticks((-180, -90, 0, 90, 180))

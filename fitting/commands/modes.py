@@ -18,6 +18,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="study file (.toml), folder of a fit, or frequency responses such as a universal file",
     )
     parser.add_argument("--band", nargs=2, type=float, metavar=("LOW", "HIGH"), help="frequencies to look at [Hz]")
+    parser.add_argument(
+        "--as-measured",
+        action="store_true",
+        help="do not turn a test with a roving hammer around: otherwise, where there are more excitations than "
+        "responses, shapes are by reciprocity those of the points that were hit",
+    )
     add_out(parser, "out/modes")
 
 
@@ -40,6 +46,11 @@ def run(options: argparse.Namespace) -> Outcome:
 
     existing_file(options.file, "file of frequency responses")
     folder = open_folder(options.out, force=options.force)
-    text, summary = analyse_file(options.file, folder, band=tuple(options.band) if options.band else None)
+    text, summary = analyse_file(
+        options.file,
+        folder,
+        band=tuple(options.band) if options.band else None,
+        reciprocal=False if options.as_measured else None,
+    )
     close_folder(folder)
     return Outcome(text, summary)

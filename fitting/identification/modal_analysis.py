@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from fitting.identification.modal_basis import DAMPING, FORMS, ModalKind, modal_basis
 from fitting.identification.modal_fit import ModalFit, fit_modes, significance
 from fitting.identification.modal_lscf import largest_order, lscf_poles
+from fitting.identification.modal_reciprocity import by_reciprocity
 from fitting.identification.modal_result import ModalAnalysis
 from fitting.identification.modal_selection import Candidate, candidates, chosen
 from fitting.identification.modal_shapes import scaled_shapes
@@ -30,6 +31,10 @@ _ORDER, _LEAST_ORDER = 30, 3
 _UNKNOWN = 0.5
 # Correlation of neighbouring lines' residuals that tells of modes missing.
 _STRUCTURE = 0.6
+_TURNED = (
+    "Shapes are those of the points that were hit, by reciprocity, which holds for passive structures: responses and "
+    "excitations are swapped."
+)
 
 
 def modal_analysis(
@@ -41,6 +46,7 @@ def modal_analysis(
     form: str | None = None,
     damping: str = "viscous",
     residual_terms: bool = True,
+    reciprocal: bool | None = None,
 ) -> ModalAnalysis:
     """Modes of a structure from its measured frequency responses, with standard errors.
 
@@ -60,6 +66,8 @@ def modal_analysis(
         form: receptance, mobility or accelerance, where the responses do not say it themselves.
         damping: "viscous", or "hysteretic" for responses of models with a loss factor.
         residual_terms: whether there are terms for modes below and above the band.
+        reciprocal: whether excitations and responses are swapped, so that shapes are those of the points that were hit,
+            as behind a roving hammer; by default where there are more excitations than responses.
 
     Returns:
         The modes.
@@ -70,6 +78,9 @@ def modal_analysis(
     """
     require_x64()
     used, remarks = _checked(frf, band, form, damping)
+    used, turned = by_reciprocity(used, reciprocal)
+    if turned:
+        remarks.append(_TURNED)
     kind = ModalKind(used.form, damping, residual_terms)
     frequency, values = np.asarray(used.frequency), np.asarray(used.values)
     deviation = None if used.variance is None else np.sqrt(np.asarray(used.variance) / 2)
@@ -84,7 +95,7 @@ def modal_analysis(
             left += more
         found, taken, more = _fitted(frequency, values, deviation, kind, taken, drop=modes is None)
     remarks += told + left + more
-    return _result(used, found, diagram, taken, kind, remarks)
+    return _result(used, found, diagram, taken, kind, turned, remarks)
 
 
 def _checked(frf: FRF, band: tuple[float, float] | None, form: str | None, damping: str) -> tuple[FRF, list[str]]:
@@ -201,6 +212,7 @@ def _result(
     diagram: StabilisationDiagram,
     taken: list[Candidate],
     kind: ModalKind,
+    turned: bool,
     remarks: list[str],
 ) -> ModalAnalysis:
     model, frequency = found.result.model, np.asarray(frf.frequency)
@@ -232,5 +244,6 @@ def _result(
             np.array([one.stable for one in taken]) / diagram.orders,
             frequency,
         ),
+        reciprocal=turned,
         remarks=(*remarks, *scaled.remarks),
     )

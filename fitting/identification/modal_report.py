@@ -28,6 +28,7 @@ def analyse_file(
     inputs: tuple[str, ...] | None = None,
     form: str | None = None,
     damping: str = "viscous",
+    reciprocal: bool | None = None,
 ) -> tuple[str, dict[str, Any]]:
     """Modes from a file of measured frequency responses, written into a folder.
 
@@ -44,6 +45,7 @@ def analyse_file(
         inputs: excitations used; all of the file if not given.
         form: receptance, mobility or accelerance, where the responses do not say it themselves.
         damping: "viscous" or "hysteretic".
+        reciprocal: whether excitations and responses are swapped, as in `modal_analysis`.
 
     Returns:
         Table for the reader, and a summary that JSON can hold.
@@ -55,7 +57,9 @@ def analyse_file(
         frf, source = path, "responses given"
     else:
         frf, source = read_frf_uff(path, outputs=outputs, inputs=inputs), Path(path).name
-    analysis = modal_analysis(frf, band=band, order=order, modes=modes, form=form, damping=damping)
+    analysis = modal_analysis(
+        frf, band=band, order=order, modes=modes, form=form, damping=damping, reciprocal=reciprocal
+    )
     out.mkdir(parents=True, exist_ok=True)
     summary = summarise(analysis, source)
     _write_toml(analysis, summary, out / "modes.toml")
@@ -89,6 +93,7 @@ def summarise(analysis: ModalAnalysis, source: str) -> dict[str, Any]:
         "message": analysis.message,
         "band": [float(analysis.measured.frequency[0]), float(analysis.measured.frequency[-1])],
         "form": analysis.measured.form,
+        "reciprocal": analysis.reciprocal,
         "outputs": list(analysis.measured.outputs),
         "inputs": list(analysis.measured.inputs),
         "mass_normalised": analysis.mass_normalised,
@@ -106,7 +111,18 @@ def _write_toml(analysis: ModalAnalysis, summary: dict[str, Any], file: Path) ->
 
     document = tomlkit.document()
     document.add(tomlkit.comment("Modes from measured frequency responses. Frequencies in Hz, damping ratios plain."))
-    for key in ("source", "converged", "band", "form", "inputs", "outputs", "mass_normalised", "error", "remarks"):
+    for key in (
+        "source",
+        "converged",
+        "band",
+        "form",
+        "reciprocal",
+        "inputs",
+        "outputs",
+        "mass_normalised",
+        "error",
+        "remarks",
+    ):
         document.add(key, summary[key])
     shapes = analysis.to_modes().output_shapes
     table = tomlkit.aot()

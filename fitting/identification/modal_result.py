@@ -26,6 +26,16 @@ _FORMATS: Any = {
 }
 
 
+def counted(number: int, what: str) -> str:
+    """A number with its noun, as "1 mode" or "2 modes".
+
+    Args:
+        number: how many.
+        what: the noun, singular.
+    """
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
 @dataclasses.dataclass(frozen=True, repr=False)
 class ModalAnalysis:
     """Modes of a structure from its measured frequency responses. Shows itself as a table in a notebook."""
@@ -45,6 +55,8 @@ class ModalAnalysis:
     other add up to more than 1."""
     verdict: tuple[str, ...]
     """"good", or what may be wrong with each mode."""
+    reciprocal: bool
+    """Whether excitations and responses were swapped: then outputs are the points that were hit."""
     remarks: tuple[str, ...]
     """What was taken, what was left out, and why."""
 
@@ -120,11 +132,13 @@ class ModalAnalysis:
         )
         low, high = float(self.measured.frequency[0]), float(self.measured.frequency[-1])
         outputs, inputs, lines = self.measured.values.shape
+        if self.reciprocal:
+            outputs, inputs = inputs, outputs
         return " ".join(
             [
-                f"{self.frequency.size} modes from {low:g} to {high:g} Hz, in {outputs} responses to {inputs} "
-                f"excitation{'s' if inputs > 1 else ''} at {lines} lines; shapes are {scale}. They explain the "
-                f"responses but for {100 * self.error:.2g} % (rms). {self.fit.message}",
+                f"{counted(self.frequency.size, 'mode')} from {low:g} to {high:g} Hz, in "
+                f"{counted(outputs, 'response')} to {counted(inputs, 'excitation')} at {lines} lines; shapes are {scale}. "
+                f"They explain the responses but for {100 * self.error:.2g} % (rms). {self.fit.message}",
                 *self.remarks,
             ]
         )

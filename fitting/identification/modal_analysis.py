@@ -31,6 +31,8 @@ _ORDER, _LEAST_ORDER = 30, 3
 _UNKNOWN = 0.5
 # Correlation of neighbouring lines' residuals that tells of modes missing.
 _STRUCTURE = 0.6
+# By how much responses widen the errors before it is told.
+_CONTRADICTED = 2.0
 _TURNED = (
     "Shapes are those of the points that were hit, by reciprocity, which holds for passive structures: responses and "
     "excitations are swapped."
@@ -55,7 +57,8 @@ def modal_analysis(
 
     Responses are weighted by their variance if they have one. Without it the noise of each is found from what the modes
     leave, the same at all lines or growing with the response where it does (`modal_noise`), so that errors hold where
-    the modes explain all but noise; neighbouring lines that err alike, as behind a window, are allowed for.
+    the modes explain all but noise; neighbouring lines that err alike, as behind a window, are allowed for. So are
+    whole responses that err, as by gains that scatter (`modal_clusters`), where there are six responses or more.
 
     Args:
         frf: responses to one or more excitations; several excitations tell modes of one frequency apart. Names that are
@@ -206,6 +209,20 @@ def _check_numbers(taken: list[Candidate], shape: tuple[int, ...]) -> None:
         )
 
 
+def _contradicted(found: ModalFit, frequency: np.ndarray) -> list[str]:
+    """What is said where whole responses err."""
+    modes = frequency.size
+    widest = np.max(found.widened[: 2 * modes].reshape(2, modes), axis=0)
+    if np.max(widest) <= _CONTRADICTED:
+        return []
+    listed = ", ".join(f"{f:.4g} Hz" for f, one in zip(frequency, widest, strict=True) if one > _CONTRADICTED)
+    return [
+        f"Responses contradict each other more than their noise: about {listed}; errors are widened by up to "
+        f"{np.max(widest):.2g}. Gains that scatter from response to response, as by the place and direction of taps, "
+        "do this, and a structure that changed between them: compare the responses with the synthesised ones."
+    ]
+
+
 def _result(
     frf: FRF,
     found: ModalFit,
@@ -229,6 +246,7 @@ def _result(
             "responses against the synthesised ones; raise order, narrow the band, or name modes."
         )
     errors = found.result.standard_errors
+    remarks += _contradicted(found, frequency=np.asarray(model.frequency))
     return ModalAnalysis(
         measured=frf,
         synthesised=FRF(frf.frequency, jnp.asarray(found.synthesised), frf.outputs, frf.inputs, frf.form),

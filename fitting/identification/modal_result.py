@@ -136,9 +136,10 @@ class ModalAnalysis:
             outputs, inputs = inputs, outputs
         return " ".join(
             [
-                f"{counted(self.frequency.size, 'mode')} from {low:g} to {high:g} Hz, in "
-                f"{counted(outputs, 'response')} to {counted(inputs, 'excitation')} at {lines} lines; shapes are {scale}. "
-                f"They explain the responses but for {100 * self.error:.2g} % (rms). {self.fit.message}",
+                f"{counted(self.frequency.size, 'mode')} from {low:g} to {high:g} Hz, in",
+                f"{counted(outputs, 'response')} to {counted(inputs, 'excitation')} at {lines} lines;",
+                f"shapes are {scale}. They explain the responses but for {100 * self.error:.2g} % (rms).",
+                self.fit.message,
                 *self.remarks,
             ]
         )

@@ -1,5 +1,6 @@
 """A modal analysis of a file of measured responses, written down: tables, shapes and pictures."""
 
+import dataclasses
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 from fitting.identification.modal_analysis import modal_analysis
 from fitting.identification.modal_result import ModalAnalysis
 from twin.frf import FRF
-from twin.io.frf_uff import read_frf_uff
+from twin.io.frf_uff import read_frf_uff, read_largest_frf_uff
 from twin.io.modes_uff import write_modes_uff
 
 # Responses and shapes of which pictures are drawn.
@@ -53,13 +54,19 @@ def analyse_file(
     Raises:
         InputError: a file that cannot be used, whatever `modal_analysis` refuses.
     """
+    gaps: list[str] = []
     if isinstance(path, FRF):
         frf, source = path, "responses given"
     else:
-        frf, source = read_frf_uff(path, outputs=outputs, inputs=inputs), Path(path).name
+        source = Path(path).name
+        if outputs is None and inputs is None:
+            frf, gaps = read_largest_frf_uff(path)
+        else:
+            frf = read_frf_uff(path, outputs=outputs, inputs=inputs)
     analysis = modal_analysis(
         frf, band=band, order=order, modes=modes, form=form, damping=damping, reciprocal=reciprocal
     )
+    analysis = dataclasses.replace(analysis, remarks=(*gaps, *analysis.remarks))
     out.mkdir(parents=True, exist_ok=True)
     summary = summarise(analysis, source)
     _write_toml(analysis, summary, out / "modes.toml")

@@ -7,7 +7,7 @@ import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
-from modal_systems import FREQUENCY, LINES, RATIO, response, shapes_for
+from modal_systems import FREQUENCY, LINES, RATIO, response, shapes_for, write_uff
 
 from fitting.identification.modal_analysis import modal_analysis
 from fitting.identification.modal_report import analyse_file
@@ -19,40 +19,6 @@ from twin.io.modes_uff import write_modes_uff
 from twin.modal import ReferenceModes
 
 matplotlib.use("Agg")
-
-
-def write_uff(path, frf, motion=12):
-    import pyuff
-
-    sets = []
-    for i, output in enumerate(frf.outputs):
-        for j, excitation in enumerate(frf.inputs):
-            sets.append(
-                pyuff.prepare_58(
-                    binary=0,
-                    func_type=4,
-                    rsp_node=int(output.split()[0]),
-                    rsp_dir=1,
-                    ref_node=int(excitation.split()[0]),
-                    ref_dir=1,
-                    data=np.asarray(frf.values)[i, j],
-                    x=np.asarray(frf.frequency),
-                    **{f"id{k}": "tap" for k in range(1, 6)},
-                    ver_num=1,
-                    load_case_id=0,
-                    z_axis_spec_data_type=0,
-                    rsp_ent_name="NONE",
-                    ref_ent_name="NONE",
-                    abscissa_spacing=1,
-                    abscissa_min=float(frf.frequency[0]),
-                    abscissa_inc=float(frf.frequency[1] - frf.frequency[0]),
-                    abscissa_spec_data_type=18,
-                    ordinate_spec_data_type=motion,
-                    orddenom_spec_data_type=13,
-                )
-            )
-    pyuff.UFF(str(path)).write_sets(sets, "overwrite")
-    return path
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from fitting.identification.modal_basis import DAMPING, FORMS, ModalKind, modal_
 from fitting.identification.modal_fit import ModalFit, fit_modes, significance
 from fitting.identification.modal_lscf import largest_order, lscf_poles
 from fitting.identification.modal_reciprocity import by_reciprocity
-from fitting.identification.modal_result import ModalAnalysis
+from fitting.identification.modal_result import ModalAnalysis, counted
 from fitting.identification.modal_selection import Candidate, candidates, chosen
 from fitting.identification.modal_shapes import scaled_shapes
 from fitting.identification.modal_stabilisation import LARGEST_DAMPING, StabilisationDiagram, stabilisation_diagram
@@ -92,7 +92,7 @@ def modal_analysis(
         by_output, by_line = _weights(values, deviation)
         poles = lscf_poles(frequency, values, by_output, highest)
         diagram = stabilisation_diagram(poles, frequency, values, by_line, kind)
-        taken, left = chosen(candidates(diagram), modes, highest)
+        taken, left = chosen(candidates(diagram), modes, highest, (float(frequency[0]), float(frequency[-1])))
         if modes is None:
             taken, more = _needed(taken, frequency, values, by_line, kind)
             left += more
@@ -114,8 +114,9 @@ def _checked(frf: FRF, band: tuple[float, float] | None, form: str | None, dampi
         raise InputError(f"band is {band} Hz, but must be a lower and a higher frequency.")
     remarks = []
     if float(frf.frequency[0]) <= 0:
+        if band is None or band[0] <= 0:
+            remarks.append("The line at 0 Hz was left out.")
         frf = frf.between(np.nextafter(0, 1), np.inf)
-        remarks.append("The line at 0 Hz was left out.")
     frf = frf if band is None else frf.between(*band)
     finite("frf", np.abs(np.asarray(frf.values)))
     if not np.any(np.asarray(frf.values)):
@@ -239,14 +240,21 @@ def _result(
     parts = np.concatenate([np.real(found.shapes), np.imag(found.shapes)], axis=1)
     alone = [np.einsum("ifk,ok->oif", basis[..., [m, modes + m]], parts[:, [m, modes + m]]) for m in range(modes)]
     power = np.sum(np.abs(np.asarray(frf.values)) ** 2)
+    warnings = []
     if found.correlation > _STRUCTURE and found.result.stop != "at_precision":
-        remarks.append(
+        warnings.append(
             f"What the modes leave hangs together from line to line (correlation {found.correlation:.2g}), by which "
             "the errors are widened: modes are missing, the structure is not linear, or a window leaks. Look at the "
             "responses against the synthesised ones; raise order, narrow the band, or name modes."
         )
     errors = found.result.standard_errors
-    remarks += _contradicted(found, frequency=np.asarray(model.frequency))
+    points = len(frf.outputs)
+    if points < modes:
+        warnings.append(
+            f"Shapes at {counted(points, 'point')} do not tell {modes} modes apart: a MAC among them misleads. Measure "
+            "at more points than there are modes."
+        )
+    warnings += _contradicted(found, frequency=np.asarray(model.frequency))
     return ModalAnalysis(
         measured=frf,
         synthesised=FRF(frf.frequency, jnp.asarray(found.synthesised), frf.outputs, frf.inputs, frf.form),
@@ -263,5 +271,6 @@ def _result(
             frequency,
         ),
         reciprocal=turned,
-        remarks=(*remarks, *scaled.remarks),
+        warnings=(*warnings, *scaled.remarks),
+        remarks=tuple(remarks),
     )

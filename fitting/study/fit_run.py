@@ -35,7 +35,7 @@ from fitting.study.fit_report import write_fit_report
 from fitting.study.lowered_noise import lowered_noise
 from fitting.study.shown import shown_estimates
 from fitting.study.study_file import StudyFile
-from fitting.study.written import versions, write_fitted, write_run
+from fitting.study.written import write_fitted, write_run
 from twin._checks import InputError
 from twin.frf import FRF
 from twin.io.parameter_file import ParameterEntry, write_parameters

@@ -49,7 +49,7 @@ def read_frf_uff(
         InputError: a file that cannot be read, no response function in it, one given twice or missing, functions of
             different form or frequencies, a quantity other than motion over force.
     """
-    found, form, file = _functions(path, names or {}, outputs, inputs)
+    found, form, file, _ = _functions(path, names or {}, outputs, inputs)
     rows = tuple(dict.fromkeys(response for response, _ in found)) if outputs is None else outputs
     columns = tuple(dict.fromkeys(excitation for _, excitation in found)) if inputs is None else inputs
     for pair in ((row, column) for row in rows for column in columns):
@@ -61,19 +61,20 @@ def read_frf_uff(
     return _stacked(found, rows, columns, form)
 
 
-def read_largest_frf_uff(path: str | os.PathLike[str]) -> tuple[FRF, list[str]]:
+def read_largest_frf_uff(path: str | os.PathLike[str]) -> tuple[FRF, list[str], str]:
     """Read the frequency response functions of a universal file; where some are missing, the largest whole grid.
 
     Args:
         path: the file.
 
     Returns:
-        The response, as `read_frf_uff` gives it, and remarks on what is missing and what was left out for it.
+        The response, as `read_frf_uff` gives it; remarks on what is missing and what was left out for it; name of the
+        component, as the file has it.
 
     Raises:
         InputError: what `read_frf_uff` refuses, but missing functions.
     """
-    found, form, _ = _functions(path, {}, None, None)
+    found, form, _, components = _functions(path, {}, None, None)
     gaps = missing(found)
     rows, columns = largest_grid(found)
     remarks = []
@@ -89,7 +90,7 @@ def read_largest_frf_uff(path: str | os.PathLike[str]) -> tuple[FRF, list[str]]:
             f"Not measured (response / excitation): {listed}{more}. The largest whole grid is used, {len(rows)} x "
             f"{len(columns)}, without {without}."
         )
-    return _stacked(found, rows, columns, form), remarks
+    return _stacked(found, rows, columns, form), remarks, ", ".join(components)
 
 
 def _functions(
@@ -97,8 +98,8 @@ def _functions(
     names: Mapping[int, str],
     outputs: tuple[str, ...] | None,
     inputs: tuple[str, ...] | None,
-) -> tuple[Found, str, Path]:
-    """Those wanted of the file, their form, and the file."""
+) -> tuple[Found, str, Path, list[str]]:
+    """Those wanted of the file, their form, the file, and the names of its components."""
     sets, file = read_sets(path)
     length, force = unit_factors(sets)
     functions = [one for one in sets if one["type"] == 58 and int(one["func_type"]) == _FREQUENCY_RESPONSE]
@@ -128,7 +129,8 @@ def _functions(
     if len(forms) > 1:
         listed = " and ".join(f"{form} ({pair[0]} / {pair[1]})" for form, pair in forms.items())
         raise InputError(f"Universal file {str(file)!r} mixes {listed}. Choose outputs and inputs of one form.")
-    return found, next(iter(forms)), file
+    entities = (str(one.get(f"{end}_ent_name", "")).strip() for one in functions for end in ("rsp", "ref"))
+    return found, next(iter(forms)), file, [name for name in dict.fromkeys(entities) if name not in ("", "NONE")]
 
 
 def _stacked(found: Found, rows: tuple[str, ...], columns: tuple[str, ...], form: str) -> FRF:

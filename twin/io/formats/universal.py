@@ -49,7 +49,7 @@ def read(file: Path, limit: int, *, units: dict[int, str] | None = None) -> tupl
     others = sorted({kind for kind in kinds if kind != 58})
     remarks = [f"Datasets of type {', '.join(map(str, others))} are left out."] if others else []
     if 55 in others:
-        remarks.append("Normal modes (dataset 55) are read by twin.io.component_uff.read_component_uff.")
+        remarks.append("Normal modes (dataset 55) make a component of a machine; read them as such.")
     if not functions:
         raise InputError(
             f"Universal file {str(file)!r} holds no function at nodes (dataset 58), but datasets of type "

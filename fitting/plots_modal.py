@@ -74,8 +74,8 @@ def plot_synthesis(
 
     Args:
         analysis: the analysis.
-        response: name of the response.
-        excitation: name of the excitation.
+        response: name of the response in `analysis.measured`.
+        excitation: name of the excitation there.
         axes: two axes; new ones if not given.
 
     Returns:
@@ -92,13 +92,13 @@ def plot_synthesis(
         (analysis.measured, {"color": "0.6", "lw": 2.2, "label": "measured"}),
         (analysis.synthesised, {"color": "C3", "lw": 1.0, "label": "modes"}),
     )
+    fitted = np.unwrap(np.angle(np.asarray(analysis.synthesised[response, excitation])))
     for one, style in styles:
         values = np.asarray(one[response, excitation])
         above.plot(frequency, np.abs(values), **style)
-        # A line from +180° to -180° is none.
-        angle = np.degrees(np.angle(values))
-        turned = np.flatnonzero(np.abs(np.diff(angle)) > 180) + 1
-        below.plot(np.insert(np.asarray(frequency), turned, np.nan), np.insert(angle, turned, np.nan), **style)
+        # Noise would wind a phase up that is followed by itself: both follow that of the modes.
+        away = np.angle(values * np.exp(-1j * fitted))
+        below.plot(frequency, np.degrees(fitted + away), **style)
     error = np.abs(np.asarray(analysis.measured[response, excitation] - analysis.synthesised[response, excitation]))
     if np.any(error > 0):
         above.plot(frequency, error, color="C0", lw=0.5, alpha=0.7, label="difference")
@@ -106,11 +106,14 @@ def plot_synthesis(
     above.set_yscale("log")
     if np.any(size > 0):
         above.set_ylim(max(0.1 * size[size > 0].min(), 1e-5 * size.max()), 2 * size.max())
-    above.set_ylabel(f"|{response} / force {excitation}| [{_UNITS[analysis.measured.form]}]")
+    there, force = (excitation, response) if analysis.reciprocal else (response, excitation)
+    above.set_ylabel(f"|{there} / force {force}| [{_UNITS[analysis.measured.form]}]")
     above.legend(fontsize="small", ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False)
     below.set_ylabel("phase [°]")
-    below.set_yticks((-180, -90, 0, 90, 180))
-    below.set_ylim(-190, 190)
+    low, high = np.degrees(fitted.min()), np.degrees(fitted.max())
+    step = 90 * 2 ** max(0, int(np.ceil(np.log2(max(high - low, 1.0) / 450))))
+    below.set_yticks(np.arange(step * np.floor(low / step), high + step, step))
+    below.set_ylim(low - 60, high + 60)
     below.set_xlabel("frequency [Hz]")
     for ax in (above, below):
         ax.grid(True, which="major", alpha=0.25)
@@ -178,10 +181,11 @@ def plot_shape(analysis: ModalAnalysis, mode: int, *, ax: "Axes | None" = None) 
         real,
         2 * analysis.shape_errors[:, mode - 1],
         fmt="o",
-        ms=4,
+        ms=3.5,
         color="C0",
         ecolor="0.3",
-        label="in phase, ± 2σ",
+        capsize=3,
+        label="in phase, ± 2 standard errors",
     )
     ax.plot(rows, np.imag(shape[:, 0] * turn), ".", ms=4, color="C3", label="across")
     ax.axhline(0, color="0.3", lw=0.8)
@@ -190,9 +194,11 @@ def plot_shape(analysis: ModalAnalysis, mode: int, *, ax: "Axes | None" = None) 
     ax.set_xticks(rows[::every], analysis.measured.outputs[::every], rotation=90, fontsize="x-small")
     ax.set_ylabel("shape [1/√kg]" if analysis.mass_normalised else "shape [-]")
     ax.set_title(
-        f"mode {mode}: {analysis.frequency[mode - 1]:.5g} Hz, damping ratio {analysis.damping_ratio[mode - 1]:.3g}",
+        f"mode {mode}: {analysis.frequency[mode - 1]:.5g} Hz, {100 * analysis.damping_ratio[mode - 1]:.3g} %",
         fontsize="medium",
+        loc="left",
     )
     ax.margins(x=0.02)
-    ax.legend(fontsize="x-small", loc="best", ncols=2)
+    # Above the axes, where it hides no point.
+    ax.legend(fontsize="x-small", ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     return ax

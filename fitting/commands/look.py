@@ -37,7 +37,13 @@ def run(options: argparse.Namespace) -> Outcome:
     given = dict(_pair(text) for text in options.option)
     if options.time is not None:
         given["time"] = options.time
-    seen = look(read_measurement(options.file, format=options.format, **_typed(given)))
+    try:
+        measurement = read_measurement(options.file, format=options.format, **_typed(given))
+    except InputError:
+        if (modes := _modes(options.file)) is None:
+            raise
+        return modes
+    seen = look(measurement)
     text, summary = seen.text(), seen.summary()
     if options.out is not None:
         from twin.io.look_plots import save_looks
@@ -48,6 +54,25 @@ def run(options: argparse.Namespace) -> Outcome:
         text += f"\n\nPictures in {folder}: {', '.join(file.name for file in files) or 'none'}"
         summary["pictures"] = [str(file) for file in files]
     return Outcome(text, summary)
+
+
+def _modes(file: Path) -> Outcome | None:
+    """The modes of a universal file that holds no measurements but these; None for any other file."""
+    from twin.io._mode_list import listed_modes
+    from twin.io.formats import universal
+
+    with file.open("rb") as stream:
+        if not universal.matches(stream.read(256)):
+            return None
+    found = listed_modes(file)
+    if not found:
+        return None
+    lines = [f"{file}: universal, {len(found)} modes at {found[0].nodes} nodes (dataset 55), no measurements"]
+    lines += [f"  {text}" for text in found[0].header[1:]]
+    lines += ["", "mode  frequency [Hz]  damping ratio"]
+    lines += [f"{one.number:4}  {one.frequency:14.6g}  {one.damping_ratio:13.6g}" for one in found]
+    summary = {"file": str(file), "format": "universal", "modes": [one._asdict() for one in found]}
+    return Outcome("\n".join(lines), summary)
 
 
 def _pair(text: str) -> tuple[str, str]:

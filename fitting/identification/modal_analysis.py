@@ -16,7 +16,8 @@ from threadpoolctl import threadpool_limits
 from fitting.identification.modal_basis import DAMPING, FORMS, ModalKind, modal_basis
 from fitting.identification.modal_fit import ModalFit, fit_modes, significance
 from fitting.identification.modal_lscf import largest_order, lscf_poles
-from fitting.identification.modal_result import ModalAnalysis
+from fitting.identification.modal_reciprocity import by_reciprocity
+from fitting.identification.modal_result import ModalAnalysis, counted
 from fitting.identification.modal_selection import Candidate, candidates, chosen
 from fitting.identification.modal_shapes import scaled_shapes
 from fitting.identification.modal_stabilisation import LARGEST_DAMPING, StabilisationDiagram, stabilisation_diagram
@@ -30,6 +31,12 @@ _ORDER, _LEAST_ORDER = 30, 3
 _UNKNOWN = 0.5
 # Correlation of neighbouring lines' residuals that tells of modes missing.
 _STRUCTURE = 0.6
+# By how much responses widen the errors before it is told.
+_CONTRADICTED = 2.0
+_TURNED = (
+    "Shapes are those of the points that were hit, by reciprocity, which holds for passive structures: responses and "
+    "excitations are swapped."
+)
 
 
 def modal_analysis(
@@ -41,6 +48,7 @@ def modal_analysis(
     form: str | None = None,
     damping: str = "viscous",
     residual_terms: bool = True,
+    reciprocal: bool | None = None,
 ) -> ModalAnalysis:
     """Modes of a structure from its measured frequency responses, with standard errors.
 
@@ -49,7 +57,8 @@ def modal_analysis(
 
     Responses are weighted by their variance if they have one. Without it the noise of each is found from what the modes
     leave, the same at all lines or growing with the response where it does (`modal_noise`), so that errors hold where
-    the modes explain all but noise; neighbouring lines that err alike, as behind a window, are allowed for.
+    the modes explain all but noise; neighbouring lines that err alike, as behind a window, are allowed for. So are
+    whole responses that err, as by gains that scatter (`modal_clusters`), where there are six responses or more.
 
     Args:
         frf: responses to one or more excitations; several excitations tell modes of one frequency apart. Names that are
@@ -60,6 +69,8 @@ def modal_analysis(
         form: receptance, mobility or accelerance, where the responses do not say it themselves.
         damping: "viscous", or "hysteretic" for responses of models with a loss factor.
         residual_terms: whether there are terms for modes below and above the band.
+        reciprocal: whether excitations and responses are swapped, so that shapes are those of the points that were hit,
+            as behind a roving hammer; by default where there are more excitations than responses.
 
     Returns:
         The modes.
@@ -70,6 +81,9 @@ def modal_analysis(
     """
     require_x64()
     used, remarks = _checked(frf, band, form, damping)
+    used, turned = by_reciprocity(used, reciprocal)
+    if turned:
+        remarks.append(_TURNED)
     kind = ModalKind(used.form, damping, residual_terms)
     frequency, values = np.asarray(used.frequency), np.asarray(used.values)
     deviation = None if used.variance is None else np.sqrt(np.asarray(used.variance) / 2)
@@ -78,13 +92,13 @@ def modal_analysis(
         by_output, by_line = _weights(values, deviation)
         poles = lscf_poles(frequency, values, by_output, highest)
         diagram = stabilisation_diagram(poles, frequency, values, by_line, kind)
-        taken, left = chosen(candidates(diagram), modes, highest)
+        taken, left = chosen(candidates(diagram), modes, highest, (float(frequency[0]), float(frequency[-1])))
         if modes is None:
             taken, more = _needed(taken, frequency, values, by_line, kind)
             left += more
         found, taken, more = _fitted(frequency, values, deviation, kind, taken, drop=modes is None)
     remarks += told + left + more
-    return _result(used, found, diagram, taken, kind, remarks)
+    return _result(used, found, diagram, taken, kind, turned, remarks)
 
 
 def _checked(frf: FRF, band: tuple[float, float] | None, form: str | None, damping: str) -> tuple[FRF, list[str]]:
@@ -100,8 +114,9 @@ def _checked(frf: FRF, band: tuple[float, float] | None, form: str | None, dampi
         raise InputError(f"band is {band} Hz, but must be a lower and a higher frequency.")
     remarks = []
     if float(frf.frequency[0]) <= 0:
+        if band is None or band[0] <= 0:
+            remarks.append("The line at 0 Hz was left out.")
         frf = frf.between(np.nextafter(0, 1), np.inf)
-        remarks.append("The line at 0 Hz was left out.")
     frf = frf if band is None else frf.between(*band)
     finite("frf", np.abs(np.asarray(frf.values)))
     if not np.any(np.asarray(frf.values)):
@@ -195,12 +210,27 @@ def _check_numbers(taken: list[Candidate], shape: tuple[int, ...]) -> None:
         )
 
 
+def _contradicted(found: ModalFit, frequency: np.ndarray) -> list[str]:
+    """What is said where whole responses err."""
+    modes = frequency.size
+    widest = np.max(found.widened[: 2 * modes].reshape(2, modes), axis=0)
+    if np.max(widest) <= _CONTRADICTED:
+        return []
+    listed = ", ".join(f"{f:.4g} Hz" for f, one in zip(frequency, widest, strict=True) if one > _CONTRADICTED)
+    return [
+        f"Responses contradict each other more than their noise: about {listed}; errors are widened by up to "
+        f"{np.max(widest):.2g}. Gains that scatter from response to response, as by the place and direction of taps, "
+        "do this, and a structure that changed between them: compare the responses with the synthesised ones."
+    ]
+
+
 def _result(
     frf: FRF,
     found: ModalFit,
     diagram: StabilisationDiagram,
     taken: list[Candidate],
     kind: ModalKind,
+    turned: bool,
     remarks: list[str],
 ) -> ModalAnalysis:
     model, frequency = found.result.model, np.asarray(frf.frequency)
@@ -210,13 +240,21 @@ def _result(
     parts = np.concatenate([np.real(found.shapes), np.imag(found.shapes)], axis=1)
     alone = [np.einsum("ifk,ok->oif", basis[..., [m, modes + m]], parts[:, [m, modes + m]]) for m in range(modes)]
     power = np.sum(np.abs(np.asarray(frf.values)) ** 2)
+    warnings = []
     if found.correlation > _STRUCTURE and found.result.stop != "at_precision":
-        remarks.append(
+        warnings.append(
             f"What the modes leave hangs together from line to line (correlation {found.correlation:.2g}), by which "
             "the errors are widened: modes are missing, the structure is not linear, or a window leaks. Look at the "
             "responses against the synthesised ones; raise order, narrow the band, or name modes."
         )
     errors = found.result.standard_errors
+    points = len(frf.outputs)
+    if points < modes:
+        warnings.append(
+            f"Shapes at {counted(points, 'point')} do not tell {modes} modes apart: a MAC among them misleads. Measure "
+            "at more points than there are modes."
+        )
+    warnings += _contradicted(found, frequency=np.asarray(model.frequency))
     return ModalAnalysis(
         measured=frf,
         synthesised=FRF(frf.frequency, jnp.asarray(found.synthesised), frf.outputs, frf.inputs, frf.form),
@@ -232,5 +270,7 @@ def _result(
             np.array([one.stable for one in taken]) / diagram.orders,
             frequency,
         ),
-        remarks=(*remarks, *scaled.remarks),
+        reciprocal=turned,
+        warnings=(*warnings, *scaled.remarks),
+        remarks=tuple(remarks),
     )

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fitting.identification.modal_basis import ModalKind, modal_basis, shapes_of, solve_linear
+from fitting.identification.modal_clusters import cluster_deviation
 from fitting.identification.modal_noise import noise_deviation
 from fitting.identification.modal_poles import ModalPoles
 from fitting.identification.modal_refinement import ModalProblem, factored, refined
@@ -30,6 +31,8 @@ class ModalFit(NamedTuple):
     """Responses of the modes and residual terms (outputs, inputs, frequencies)."""
     correlation: float
     """Correlation of the residuals of neighbouring lines [-]."""
+    widened: np.ndarray
+    """By what the errors of each parameter are larger because whole responses err, 1 where they do not [-]."""
 
 
 def fit_modes(
@@ -68,11 +71,13 @@ def fit_modes(
         basis = modal_basis(frequency, model.poles, model.participations, kind)
         response = np.einsum("ifk,ok->oif", basis, first.linearised(model).coefficients)
         used = np.maximum(noise_deviation(values - response, response), _FLOOR * rms)
+        model = ModalPoles.of(model.poles, model.participations)  # another excitation may drive a mode most
         problem = ModalProblem.of(frequency, values, used, kind)
         result = refined(problem, model, variance="estimated", max_steps=max_steps)
     model = result.model
     coefficients = problem.linearised(model).coefficients
     result, correlation = _with_honest_errors(result, values.shape, coefficients.size)
+    result, widened = _with_clusters(result, problem)
     basis = modal_basis(frequency, model.poles, model.participations, kind)
     return ModalFit(
         result,
@@ -80,6 +85,7 @@ def fit_modes(
         _shape_errors(problem, result, coefficients),
         np.einsum("ifk,ok->oif", basis, coefficients),
         correlation,
+        widened,
     )
 
 
@@ -94,6 +100,17 @@ def _with_honest_errors(result: FitResult, shape: tuple, eliminated: int) -> tup
         factor *= (1 + correlation) / (1 - correlation)
     covariance = factor * result.scaled_covariance
     return dataclasses.replace(result, scaled_covariance=covariance, degrees_of_freedom=freedom), correlation
+
+
+def _with_clusters(result: FitResult, problem: ModalProblem) -> tuple[FitResult, np.ndarray]:
+    """The covariance, widened where responses contradict each other more than their lines scatter; never narrowed."""
+    widened = np.ones(result.values.size)
+    scatter = cluster_deviation(problem, result.model)
+    if scatter is not None:
+        known = np.isfinite(result.standard_errors) & (result.standard_errors > 0)
+        widened[known] = np.maximum(scatter[known] / result.standard_errors[known], 1.0)
+    covariance = result.scaled_covariance * np.outer(widened, widened)
+    return dataclasses.replace(result, scaled_covariance=covariance), widened
 
 
 def _shape_errors(problem: ModalProblem, result: FitResult, coefficients: np.ndarray) -> np.ndarray:

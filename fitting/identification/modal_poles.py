@@ -11,6 +11,9 @@ from twin.parameters import Parameter, ParameterSpace
 _DAMPING = (1e-6, 0.7)
 # How far a frequency may move: in half-widths of its resonance, and in lines.
 _WIDTHS, _LINES = 3.0, 4.0
+# A participation is searched up to this size: beyond, the strongest excitation was taken for one that hardly drives the
+# mode, and the search would run away.
+_LARGEST = 1e3
 
 
 class ModalPoles(eqx.Module):
@@ -92,5 +95,7 @@ class ModalPoles(eqx.Module):
             width = float(max(f * ratio, 1e-3 * line))
             found.append(Parameter(f"frequency.{i}", "Hz", float(f - reach), float(f + reach), size=width))
         found += [Parameter(f"damping_ratio.{i}", "1", *_DAMPING, scale="log") for i in range(len(self.strongest))]
-        found += [Parameter(f"participation.{i}", "1", size=1.0) for i in range(self.participation.size)]
+        found += [
+            Parameter(f"participation.{i}", "1", -_LARGEST, _LARGEST, size=1.0) for i in range(self.participation.size)
+        ]
         return ParameterSpace(found)

@@ -1,6 +1,7 @@
 """Modes identified from measured frequency responses."""
 
 import dataclasses
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
@@ -16,14 +17,18 @@ from twin.modal import ReferenceModes
 if TYPE_CHECKING:
     import pandas as pd
 
-_FORMATS: Any = {
-    "frequency [Hz]": "{:.7g}".format,
-    "± [Hz]": "{:.2g}".format,
-    "damping ratio": "{:.5g}".format,
-    "±": "{:.2g}".format,
-    "phase collinearity": "{:.3f}".format,
-    "share of response": "{:.3g}".format,
-}
+# Most and usual number of digits behind the point.
+_MOST_DIGITS, _DIGITS = 9, 5
+
+
+def counted(number: int, what: str) -> str:
+    """A number with its noun, as "1 mode" or "2 modes".
+
+    Args:
+        number: how many.
+        what: the noun, singular.
+    """
+    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -45,6 +50,10 @@ class ModalAnalysis:
     other add up to more than 1."""
     verdict: tuple[str, ...]
     """"good", or what may be wrong with each mode."""
+    reciprocal: bool
+    """Whether excitations and responses were swapped: then outputs are the points that were hit."""
+    warnings: tuple[str, ...]
+    """What a reader has to know before all else, with the cure."""
     remarks: tuple[str, ...]
     """What was taken, what was left out, and why."""
 
@@ -67,6 +76,11 @@ class ModalAnalysis:
     def damping_error(self) -> np.ndarray:
         """Their standard errors [-]."""
         return self.fit.standard_errors[self.frequency.size : 2 * self.frequency.size]
+
+    @property
+    def intervals(self) -> np.ndarray:
+        """95 % confidence intervals of the frequencies [Hz], then of the damping ratios [-], (2, modes, 2)."""
+        return self.fit.intervals()[: 2 * self.frequency.size].reshape(2, -1, 2)
 
     @property
     def poles(self) -> np.ndarray:
@@ -120,11 +134,15 @@ class ModalAnalysis:
         )
         low, high = float(self.measured.frequency[0]), float(self.measured.frequency[-1])
         outputs, inputs, lines = self.measured.values.shape
+        if self.reciprocal:
+            outputs, inputs = inputs, outputs
         return " ".join(
             [
-                f"{self.frequency.size} modes from {low:g} to {high:g} Hz, in {outputs} responses to {inputs} "
-                f"excitation{'s' if inputs > 1 else ''} at {lines} lines; shapes are {scale}. They explain the "
-                f"responses but for {100 * self.error:.2g} % (rms). {self.fit.message}",
+                f"{counted(self.frequency.size, 'mode')} from {low:g} to {high:g} Hz, in",
+                f"{counted(outputs, 'response')} to {counted(inputs, 'excitation')} at {lines} lines;",
+                f"shapes are {scale}. They explain the responses but for {100 * self.error:.2g} % (rms).",
+                self.fit.message,
+                *self.warnings,
                 *self.remarks,
             ]
         )
@@ -141,15 +159,15 @@ class ModalAnalysis:
         )
 
     def to_dataframe(self) -> "pd.DataFrame":
-        """Table of the modes."""
+        """Table of the modes, with standard errors."""
         import pandas as pd
 
         return pd.DataFrame(
             {
                 "frequency [Hz]": self.frequency,
-                "± [Hz]": self.frequency_error,
+                "standard error [Hz]": self.frequency_error,
                 "damping ratio": self.damping_ratio,
-                "±": self.damping_error,
+                "standard error of damping ratio": self.damping_error,
                 "phase collinearity": self.phase_collinearity,
                 "share of response": self.share,
                 "verdict": list(self.verdict),
@@ -165,8 +183,26 @@ class ModalAnalysis:
         return pd.DataFrame(self.shapes, index=pd.Index(self.measured.outputs, name="response"), columns=columns)
 
     def _repr_html_(self) -> str:
-        table = self.to_dataframe().to_html(formatters=_FORMATS)
+        table = self.to_dataframe().to_html(formatters=self._formats())
         return f"<div><p><b>Modal analysis</b>: {self.message}</p>{table}</div>"
 
     def __repr__(self) -> str:
-        return f"{self.to_dataframe().to_string(formatters=_FORMATS)}\n{self.message}"
+        return f"{self.to_dataframe().to_string(formatters=self._formats())}\n{self.message}"
+
+    def _formats(self) -> Any:
+        """As many digits in a column as the smallest of its errors supports."""
+        frequency, ratio = (_fixed(error) for error in (self.frequency_error, self.damping_error))
+        return {
+            "frequency [Hz]": frequency,
+            "standard error [Hz]": frequency,
+            "damping ratio": ratio,
+            "standard error of damping ratio": ratio,
+            "phase collinearity": "{:.3f}".format,
+            "share of response": "{:.4f}".format,
+        }
+
+
+def _fixed(errors: np.ndarray) -> Callable[[float], str]:
+    known = errors[np.isfinite(errors) & (errors > 0)]
+    digits = _DIGITS if known.size == 0 else int(np.clip(1 - np.floor(np.log10(known.min())), 0, _MOST_DIGITS))
+    return f"{{:.{digits}f}}".format

@@ -54,7 +54,7 @@ def candidates(diagram: StabilisationDiagram) -> list[Candidate]:
 
 
 def chosen(
-    found: list[Candidate], modes: int | Sequence[float] | None, orders: int
+    found: list[Candidate], modes: int | Sequence[float] | None, orders: int, band: tuple[float, float]
 ) -> tuple[list[Candidate], list[str]]:
     """The candidates that are taken for modes, and what is to be said about it.
 
@@ -62,14 +62,16 @@ def chosen(
         found: candidates.
         modes: how many are wanted, or about which frequencies [Hz]; None takes all that are stable at enough orders.
         orders: highest order of the diagram.
+        band: lowest and highest frequency looked at [Hz].
 
     Raises:
         InputError: no stable pole, fewer than wanted, or none near a frequency wanted.
     """
+    where = f"{band[0]:.6g} to {band[1]:.6g} Hz"
     if not found:
         raise InputError(
-            "No pole of these responses is stable from order to order. Raise order, narrow the band to where "
-            "resonances stand out, or measure with less noise."
+            f"No pole is stable in {where}: there seems to be no mode. Look where resonances stand out, by the band; "
+            "where one does here, raise order, or measure with less noise."
         )
     listed = ", ".join(f"{abs(one.pole) / (2 * np.pi):.4g}" for one in found)
     if modes is None:
@@ -78,8 +80,8 @@ def chosen(
         taken = [one for one in found if one.stable >= _LEAST and one.near >= needed]
         if not taken:
             raise InputError(
-                f"No pole is stable at {needed} of {orders} orders; the candidates are at {listed} Hz. Raise order, "
-                "narrow the band, or name the frequencies wanted by modes."
+                f"No pole is stable in {where} at {needed} of {orders} orders: there seems to be no mode. The "
+                f"candidates are at {listed} Hz. Raise order, narrow the band, or name the frequencies wanted by modes."
             )
         return taken, [
             f"Not taken: {abs(one.pole) / (2 * np.pi):.4g} Hz, found at {one.near} of {orders} orders only (at least "

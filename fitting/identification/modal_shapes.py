@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fitting.identification.modal_reciprocity import same_direction
+
 # Largest angle of a driving point's residues against those of the form stated, as its cosine.
 _COSINE = 0.7
 
@@ -33,7 +35,8 @@ def scaled_shapes(
     """Scale shapes by what a driving point says about the modal mass.
 
     With unit modal masses the residues are φφᵀ/(2j·Im(λ)), as those of `twin.modal.damped_modes`, so that
-    participations are φ at the excitations times 1/(2j·Im(λ)). Several driving points are weighed by least squares.
+    participations are φ at the excitations times 1/(2j·Im(λ)). Several driving points are weighed by least squares. A
+    point that was hit against the direction of its sensor ("3 -z" and "3 z") is one as well.
 
     Args:
         poles: λ (modes,) [rad/s].
@@ -43,12 +46,14 @@ def scaled_shapes(
         outputs: names of the responses.
         inputs: names of the excitations.
     """
-    pairs = [(outputs.index(name), i) for i, name in enumerate(inputs) if name in outputs]
+    pairs = [
+        (o, i, sign) for i, b in enumerate(inputs) for o, a in enumerate(outputs) if (sign := same_direction(a, b))
+    ]
     spread = np.abs(errors)
     if not pairs:
         return _by_largest(shapes, spread, ())
-    rows, columns = (np.array(x) for x in zip(*pairs, strict=True))
-    driven, along = shapes[rows], participation[:, columns].T
+    rows, columns, signs = (np.array(x) for x in zip(*pairs, strict=True))
+    driven, along = shapes[rows], participation[:, columns].T * signs[:, None]
     power = np.sum(np.abs(driven) ** 2, axis=0)
     square = 2j * np.imag(poles) * np.sum(driven.conj() * along, axis=0) / np.where(power > 0, power, 1.0)
     remarks = _judged(poles, driven, along)

@@ -36,7 +36,7 @@ from fitting.study.lowered_noise import lowered_noise
 from fitting.study.shown import shown_estimates
 from fitting.study.study_file import StudyFile
 from fitting.study.timing import timing_hint
-from fitting.study.written import versions, write_fitted, write_run
+from fitting.study.written import write_fitted, write_run
 from twin._checks import InputError
 from twin.frf import FRF
 from twin.io.parameter_file import ParameterEntry, write_parameters

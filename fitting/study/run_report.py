@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from fitting.provenance import versions
 from fitting.report.asked import Asked, asked_section
 from fitting.report.content import Report, Section
 from fitting.report.page import write_report
 from fitting.study.study_file import StudyFile
-from fitting.study.written import versions
 from twin.parameters import ParameterSpace
 
 

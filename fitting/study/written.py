@@ -1,9 +1,6 @@
 """What every run of a study leaves behind: the study it was, the versions it ran with, a summary."""
 
-import hashlib
-import importlib.metadata
 import os
-import platform
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,10 +8,9 @@ from typing import Any
 import tomlkit
 
 from fitting.json_file import write_json
+from fitting.provenance import checksum, versions
 from fitting.study.study_file import StudyFile
 from twin.parameters import ParameterSpace
-
-_PACKAGES = ("drivetwin", "jax", "jaxlib", "equinox", "diffrax", "optimistix", "numpy", "scipy")
 
 
 def write_run(study: StudyFile, out: Path, command: str, summary: Mapping[str, Any]) -> dict[str, Any]:
@@ -63,25 +59,12 @@ def write_fitted(study: StudyFile, out: Path, space: ParameterSpace, values: Map
     return file
 
 
-def versions() -> dict[str, str]:
-    """Versions of Python, the platform and the packages that numbers come from."""
-    found = {"python": platform.python_version(), "platform": platform.platform()}
-    for package in _PACKAGES:
-        try:
-            found[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            continue
-    return found
-
-
 def _checksums(study: StudyFile) -> dict[str, dict[str, str]]:
     found = {}
     for name, entry in study.document.table(("data",)).items():
         file = study.document.folder / str(entry.get("file", "")) if isinstance(entry, dict) else Path()
         if file.is_file():
-            with file.open("rb") as stream:
-                digest = hashlib.file_digest(stream, "sha256").hexdigest()
-            found[name] = {"file": file.name, "sha256": digest}
+            found[name] = checksum(file)
     return found
 
 

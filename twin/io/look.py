@@ -16,6 +16,17 @@ from twin.io.measurement import MeasuredChannel, Measurement
 _MOST_ROWS = 60
 
 
+class Lines(NamedTuple):
+    """Over which frequencies a channel is given."""
+
+    first: float
+    """First frequency [Hz]."""
+    last: float
+    """Last frequency [Hz]."""
+    step: float
+    """Median distance of two lines [Hz]."""
+
+
 class ChannelFacts(NamedTuple):
     """What is said of one channel."""
 
@@ -37,6 +48,8 @@ class ChannelFacts(NamedTuple):
     """Mean."""
     rms: float
     """Root mean square."""
+    lines: Lines | None = None
+    """Over which frequencies; None for channels over time."""
 
 
 class Look(NamedTuple):
@@ -55,6 +68,8 @@ class Look(NamedTuple):
         """All of it for a reader."""
         name = self.measurement
         lines = [f"{name.source}: {name.format}, {len(name)} channels", *(f"  {told}" for told in name.remarks), ""]
+        layout = _layout(name)
+        lines += [f"Layout: {layout}.", ""] if layout else []
         lines += _table(self.facts)
         if self.findings:
             lines += ["", "Worth a look:", *(f"  {finding.channel}: {finding.text}" for finding in self.findings)]
@@ -70,6 +85,7 @@ class Look(NamedTuple):
             "file": self.measurement.source,
             "format": self.measurement.format,
             "remarks": list(self.measurement.remarks),
+            "layout": _layout(self.measurement),
             "channels": [_plain(facts) for facts in self.facts],
             "findings": [finding._asdict() for finding in self.findings],
             "study": self.study,
@@ -112,16 +128,41 @@ def _facts(channel: MeasuredChannel) -> ChannelFacts:
         usual = steps[(steps > 0) & (steps < 1.9 * median)]  # gaps are told elsewhere
         jitter = float(np.std(usual) / median) if usual.size and median > 0 else None
     rate = channel.rate if channel.abscissa == "time" else None
-    return ChannelFacts(channel.name, channel.unit, channel.values.size, rate, jitter, *map(float, figures))
+    lines = None
+    if channel.abscissa == "frequency" and channel.times is not None and channel.times.size > 1:
+        times = channel.times
+        lines = Lines(float(times[0]), float(times[-1]), float(np.median(np.diff(times))))
+    return ChannelFacts(
+        channel.name, channel.unit, channel.values.size, rate, jitter, *map(float, figures), lines=lines
+    )
+
+
+def _layout(measurement: Measurement) -> str:
+    """How many responses to how many excitations a file of frequency responses has; empty for any other."""
+    pairs = {tuple(one.name.split("/", 1)) for one in measurement if one.values.dtype.kind == "c" and "/" in one.name}
+    if not pairs:
+        return ""
+    outputs, inputs = (len({pair[i] for pair in pairs}) for i in (0, 1))
+    there = "" if len(pairs) == outputs * inputs else f", {outputs * inputs - len(pairs)} missing"
+    return (
+        f"{outputs} response{'s' * (outputs > 1)} x {inputs} excitation{'s' * (inputs > 1)}"
+        f" ({outputs * inputs} frequency responses{there})"
+    )
 
 
 def _table(facts: tuple[ChannelFacts, ...]) -> list[str]:
-    rows: list[tuple[str, ...]] = [("channel", "unit", "samples", "rate [Hz]", "jitter", "min", "max", "mean", "rms")]
+    spectra = all(one.lines is not None for one in facts)
+    abscissa = ("lines", "first [Hz]", "last [Hz]", "step [Hz]") if spectra else ("samples", "rate [Hz]", "jitter")
+    figures = ("smallest", "largest", "mean", "rms") if spectra else ("min", "max", "mean", "rms")
+    rows: list[tuple[str, ...]] = [("channel", "unit", *abscissa, *figures)]
     for one in facts[:_MOST_ROWS]:
-        rate = "" if one.rate is None else f"{one.rate:.6g}"
-        jitter = "" if one.jitter is None else f"{100 * one.jitter if one.jitter > 1e-6 else 0:.2g} %"
-        figures = (f"{value:.5g}" for value in (one.minimum, one.maximum, one.mean, one.rms))
-        rows.append((one.name, one.unit or "?", str(one.samples), rate, jitter, *figures))
+        if spectra and one.lines is not None:
+            place = tuple(f"{value:.6g}" for value in one.lines)
+        else:
+            rate = "" if one.rate is None else f"{one.rate:.6g}"
+            place = (rate, "" if one.jitter is None else f"{100 * one.jitter if one.jitter > 1e-6 else 0:.2g} %")
+        values = (f"{value:.5g}" for value in (one.minimum, one.maximum, one.mean, one.rms))
+        rows.append((one.name, one.unit or "?", str(one.samples), *place, *values))
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     lines = [
         "  ".join(
@@ -135,7 +176,11 @@ def _table(facts: tuple[ChannelFacts, ...]) -> list[str]:
 
 def _plain(facts: ChannelFacts) -> dict[str, Any]:
     return {
-        key: None if isinstance(value, float) and not np.isfinite(value) else value
+        key: None
+        if isinstance(value, float) and not np.isfinite(value)
+        else value._asdict()
+        if isinstance(value, Lines)
+        else value
         for key, value in facts._asdict().items()
     }
 

@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,18 +12,21 @@ from twin.modal.reference import ReferenceModes
 from twin.structure import DIRECTIONS
 
 
-def write_modes_uff(path: str | os.PathLike[str], modes: ReferenceModes, *, mass_normalised: bool = False) -> Path:
+def write_modes_uff(
+    path: str | os.PathLike[str], modes: ReferenceModes, *, mass_normalised: bool = False, notes: Sequence[str] = ()
+) -> Path:
     """Write modes to a universal file (dataset 55, data at nodes), ASCII, in SI units.
 
     Real shapes are written as normal modes with their damping ratio, and unit modal mass if they are mass-normalised;
     complex shapes as complex modes with their eigenvalues. Rows are named "node direction", as "12 x"; nodes whose
     names are no numbers are numbered in the order of the rows, from 1, and listed in the header of each mode. A
-    direction that was not measured is zero. The format keeps six digits.
+    direction that was not measured is zero. The format keeps six digits; the header has more of frequency and damping.
 
     Args:
         path: the file; one that exists is replaced.
         modes: the modes.
         mass_normalised: whether real shapes have unit modal mass.
+        notes: up to two lines for the header of each mode, such as where the modes come from; cut at 80 letters.
 
     Returns:
         Path of the file.
@@ -53,7 +57,8 @@ def write_modes_uff(path: str | os.PathLike[str], modes: ReferenceModes, *, mass
         table = np.zeros((len(nodes), 6 if turning else 3), dtype=shapes.dtype)
         for (node, direction), value in zip(places, shapes[:, i], strict=True):
             table[nodes.index(node), direction] = value
-        one = {**rest, **kind, "mode_n": i + 1, "id1": f"mode {i + 1}: {frequency:.6g} Hz, damping ratio {ratio:.4g}"}
+        one = {**rest, **kind, "mode_n": i + 1, "id1": f"mode {i + 1}: {frequency:.10g} Hz, damping ratio {ratio:.8g}"}
+        one |= {f"id{k}": note[:80] for k, note in enumerate(notes[:2], start=2) if note}
         one |= {f"r{k + 1}": table[:, k] for k in range(table.shape[1])}
         if whole:
             omega = 2 * np.pi * frequency

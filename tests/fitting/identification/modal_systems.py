@@ -34,6 +34,43 @@ def response(
     return FRF(jnp.asarray(lines), jnp.asarray(values), names, excited, form), size
 
 
+def write_uff(path, frf, motion=12, missing=()):
+    """Responses as a universal file, along x; without those of `missing`, (output, input)."""
+    import pyuff
+
+    sets = []
+    for i, output in enumerate(frf.outputs):
+        for j, excitation in enumerate(frf.inputs):
+            if (output, excitation) in missing:
+                continue
+            sets.append(
+                pyuff.prepare_58(
+                    binary=0,
+                    func_type=4,
+                    rsp_node=int(output.split()[0]),
+                    rsp_dir=1,
+                    ref_node=int(excitation.split()[0]),
+                    ref_dir=1,
+                    data=np.asarray(frf.values)[i, j],
+                    x=np.asarray(frf.frequency),
+                    **{f"id{k}": "tap" for k in range(1, 6)},
+                    ver_num=1,
+                    load_case_id=0,
+                    z_axis_spec_data_type=0,
+                    rsp_ent_name="NONE",
+                    ref_ent_name="NONE",
+                    abscissa_spacing=1,
+                    abscissa_min=float(frf.frequency[0]),
+                    abscissa_inc=float(frf.frequency[1] - frf.frequency[0]),
+                    abscissa_spec_data_type=18,
+                    ordinate_spec_data_type=motion,
+                    orddenom_spec_data_type=13,
+                )
+            )
+    pyuff.UFF(str(path)).write_sets(sets, "overwrite")
+    return path
+
+
 def state_space_modes(system, below):
     """Poles and shapes of M·ẍ + C·ẋ + (K + jD)·x = 0 by the eigenvalues of its state space, ascending."""
     mass, viscous = np.asarray(system.mass), np.asarray(system.viscous)

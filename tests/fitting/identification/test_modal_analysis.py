@@ -143,5 +143,5 @@ def test_modes_go_into_the_criteria_of_models():
     assert np.all(np.diag(alike) > 0.98)
     table = analysis.to_dataframe()
     assert list(table.index) == [1, 2, 3, 4, 5, 6] and "verdict" in table
-    assert "<table" in analysis._repr_html_() and "± [Hz]" in repr(analysis)
+    assert "<table" in analysis._repr_html_() and "standard error [Hz]" in repr(analysis)
     assert analysis.shapes_dataframe().shape == (8, 6)

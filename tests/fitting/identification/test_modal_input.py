@@ -8,6 +8,7 @@ import pytest
 from modal_systems import FREQUENCY, LINES, RATIO, response, shapes_for
 
 from fitting.identification.modal_analysis import modal_analysis
+from fitting.identification.modal_selection import Candidate, chosen
 from twin._checks import InputError
 from twin.frf import FRF
 
@@ -86,6 +87,17 @@ def test_the_line_at_zero_is_left_out():
     analysis = modal_analysis(frf)
     assert "0 Hz was left out" in analysis.message
     np.testing.assert_allclose(analysis.frequency, FREQUENCY, rtol=1e-6)
+
+
+def test_a_line_at_zero_outside_of_the_band_is_not_told():
+    frf, _ = response(FREQUENCY, RATIO, shapes_for(6), np.arange(0.0, 110.0, 0.25))
+    assert "0 Hz was left out" not in modal_analysis(frf, band=(10.0, 50.0)).message
+
+
+@pytest.mark.parametrize("rare", [[], [Candidate(-3.0 + 2800.0j, np.ones(1), 2, 4)]])
+def test_a_band_without_modes_is_told(rare):
+    with pytest.raises(InputError, match=r"stable in 400 to 480 Hz.*there seems to be no mode"):
+        chosen(rare, None, 30, (400.0, 480.0))
 
 
 def test_order_is_lowered_to_what_the_lines_allow():

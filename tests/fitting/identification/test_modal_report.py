@@ -1,5 +1,6 @@
 """From a universal file to tables, shapes and pictures, without any Python in between."""
 
+import hashlib
 import json
 import tomllib
 
@@ -7,11 +8,14 @@ import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
-from modal_systems import FREQUENCY, LINES, RATIO, response, shapes_for
+from modal_systems import FREQUENCY, LINES, RATIO, response, shapes_for, write_uff
 
+from fitting.cli import main
 from fitting.identification.modal_analysis import modal_analysis
+from fitting.identification.modal_reciprocity import turned_around
 from fitting.identification.modal_report import analyse_file
 from fitting.plots_modal import mode_indicator, plot_mac, plot_shape, plot_stabilisation, plot_synthesis
+from tests.fitting.report.html_page import Page
 from twin._checks import InputError
 from twin.frf import FRF
 from twin.io.frf_uff import read_frf_uff
@@ -19,40 +23,6 @@ from twin.io.modes_uff import write_modes_uff
 from twin.modal import ReferenceModes
 
 matplotlib.use("Agg")
-
-
-def write_uff(path, frf, motion=12):
-    import pyuff
-
-    sets = []
-    for i, output in enumerate(frf.outputs):
-        for j, excitation in enumerate(frf.inputs):
-            sets.append(
-                pyuff.prepare_58(
-                    binary=0,
-                    func_type=4,
-                    rsp_node=int(output.split()[0]),
-                    rsp_dir=1,
-                    ref_node=int(excitation.split()[0]),
-                    ref_dir=1,
-                    data=np.asarray(frf.values)[i, j],
-                    x=np.asarray(frf.frequency),
-                    **{f"id{k}": "tap" for k in range(1, 6)},
-                    ver_num=1,
-                    load_case_id=0,
-                    z_axis_spec_data_type=0,
-                    rsp_ent_name="NONE",
-                    ref_ent_name="NONE",
-                    abscissa_spacing=1,
-                    abscissa_min=float(frf.frequency[0]),
-                    abscissa_inc=float(frf.frequency[1] - frf.frequency[0]),
-                    abscissa_spec_data_type=18,
-                    ordinate_spec_data_type=motion,
-                    orddenom_spec_data_type=13,
-                )
-            )
-    pyuff.UFF(str(path)).write_sets(sets, "overwrite")
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -88,11 +58,86 @@ def test_files_hold_the_modes(done):
     assert [mode["frequency"] for mode in written["mode"]] == [mode["frequency"] for mode in summary["modes"]]
     table = pd.read_csv(out / "modes.csv", index_col="mode")
     np.testing.assert_allclose(table["damping ratio"], RATIO, rtol=2e-2)
-    assert np.all(table["± [Hz]"] > 0)
+    assert np.all(table["standard error [Hz]"] > 0)
     shapes = pd.read_csv(out / "shapes.csv", index_col="response")
     assert shapes.shape == (8, 18)
+    assert np.all(table["95 % from [Hz]"] < table["frequency [Hz]"])
+    assert np.all(table["damping ratio 95 % to"] > table["damping ratio"])
+    assert not any("±" in name for name in (*table.columns, *shapes.columns)) and table.columns.is_unique
     for name in ("stabilisation.png", "responses.png", "mac.png", "shapes.png"):
         assert (out / name).stat().st_size > 10_000
+
+
+def test_the_folder_says_what_was_asked_and_of_what(done):
+    out, _, summary = done
+    held = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert held["modes"] == summary["modes"] and held["asked"]["band"] == [15.0, 105.0] and "numpy" in held["versions"]
+    file = out.parent / "tapped.uff"
+    assert held["data"]["responses"] == {"file": file.name, "sha256": hashlib.sha256(file.read_bytes()).hexdigest()}
+    low, high = held["modes"][0]["frequency_95"]
+    assert low < held["modes"][0]["frequency"] < high
+
+
+def test_the_report_has_all_sections(done):
+    out, _, summary = done
+    text = (out / "report.html").read_text(encoding="utf-8")
+    assert len(Page(text).all("svg")) > 16 + 6
+    for title in ("Modes", "Stabilisation diagram", "Shapes", "Likeness of the shapes (MAC)", "Responses at a glance"):
+        assert f">{title}</h2>" in text
+    assert summary["data"]["responses"]["sha256"] in text
+    assert text.count("not explained (rms)") == 16
+
+
+@pytest.fixture(scope="module")
+def small():
+    return response(
+        FREQUENCY[:3], RATIO[:3], shapes_for(3, 3), LINES[:160], inputs=(0, 1), form="accelerance", noise=0.005
+    )[0]
+
+
+def test_fewer_points_than_modes_have_no_mac(small, tmp_path):
+    few = FRF(small.frequency, small.values[:2], small.outputs[:2], small.inputs, small.form)
+    text, summary = analyse_file(few, tmp_path, modes=3)
+    assert "Shapes at 2 points do not tell 3 modes apart" in text and len(summary["warnings"]) >= 1
+    assert not (tmp_path / "mac.png").exists()
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Likeness" not in page and "a MAC among them misleads" in page
+
+
+def test_a_table_has_even_numbers(analysis):
+    rows = [line.split() for line in repr(analysis).splitlines()[2:8]]
+    for column in range(1, 5):
+        assert len({len(row[column].partition(".")[2]) for row in rows}) == 1
+
+
+@pytest.mark.parametrize(
+    "words, said",
+    [(["--modes", "20.0", "33"], 2), (["--modes", "2", "--order", "12"], 2), (["--modes", "x"], "neither frequencies")],
+)
+def test_modes_and_order_on_the_command_line(small, tmp_path, capsys, words, said):
+    file = write_uff(tmp_path / "a.uff", small)
+    code = main(["modes", str(file), "--out", str(tmp_path / "out"), "--json", *words])
+    told = capsys.readouterr()
+    if isinstance(said, str):
+        assert code == 2 and said in told.err
+        return
+    assert code == 0 and "looking for modes in a.uff" in told.err
+    found = json.loads(told.out)
+    assert len(found["modes"]) == said and found["asked"]["order"] == (12 if "--order" in words else None)
+
+
+def test_a_test_stays_as_it_was_measured(small, tmp_path, capsys):
+    hammer = turned_around(small)
+    file = write_uff(tmp_path / "a.uff", hammer)
+    for i, words in enumerate(([], ["--as-measured"])):
+        assert main(["modes", str(file), "--out", str(tmp_path / str(i)), "--json", "--modes", "1", *words]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["reciprocal"] == (not words) and len(found["outputs"]) == (2 if words else 3)
+
+
+def test_options_of_measured_modes_are_not_for_studies(tmp_path, capsys):
+    assert main(["modes", str(tmp_path / "a.toml"), "--order", "4"]) == 2
+    assert "--order is for measured responses" in capsys.readouterr().err
 
 
 def test_shapes_go_into_a_universal_file(done):
@@ -167,6 +212,6 @@ def test_other_pictures_return_their_axes(analysis):
     ax = plot_mac(analysis.shapes)
     assert len(ax.get_xticks()) == 6
     ax = plot_shape(analysis, 2)
-    assert "33" in ax.get_title() and ax.get_ylabel() == "shape [1/√kg]"
+    assert "33" in ax.get_title(loc="left") and ax.get_ylabel() == "shape [1/√kg]"
     with pytest.raises(InputError, match="no mode 9"):
         plot_shape(analysis, 9)

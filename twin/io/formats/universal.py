@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from twin._checks import InputError
+from twin.io._uff import check_whole
 from twin.io.formats._shared import check_count, check_room, printable
 from twin.io.measurement import MeasuredChannel
 
@@ -40,7 +41,7 @@ def read(file: Path, limit: int, *, units: dict[int, str] | None = None) -> tupl
     import pyuff  # a second to import
 
     check_room(file.stat().st_size, limit, file, "the file itself")
-    _check_marks(file)
+    check_whole(file)
     uff = pyuff.UFF(str(file))
     kinds = [int(kind) for kind in uff.get_set_types()]
     check_count(len(kinds), file)
@@ -48,7 +49,7 @@ def read(file: Path, limit: int, *, units: dict[int, str] | None = None) -> tupl
     others = sorted({kind for kind in kinds if kind != 58})
     remarks = [f"Datasets of type {', '.join(map(str, others))} are left out."] if others else []
     if 55 in others:
-        remarks.append("Normal modes (dataset 55) are read by twin.io.component_uff.read_component_uff.")
+        remarks.append("Normal modes (dataset 55) make a component of a machine; read them as such.")
     if not functions:
         raise InputError(
             f"Universal file {str(file)!r} holds no function at nodes (dataset 58), but datasets of type "
@@ -63,16 +64,6 @@ def read(file: Path, limit: int, *, units: dict[int, str] | None = None) -> tupl
     if any(channel.abscissa == "frequency" for channel in channels):
         remarks.append("Frequency responses: drivetwin modes FILE finds their modes.")
     return channels, list(dict.fromkeys(remarks))
-
-
-def _check_marks(file: Path) -> None:
-    content = file.read_bytes()
-    marks = len(re.findall(rb"    -1(?=[\r\n]| {74}|\Z)", content))
-    binary = re.search(rb"[\r\n]    58b", content) is not None  # binary numbers may look like a mark
-    if marks < 2 or (marks % 2 and not binary) or not content.rstrip(b" \r\n\0\x1a").endswith(b"-1"):
-        raise InputError(
-            f"Universal file {str(file)!r} ends within a dataset: it is cut short. Copy or export it again."
-        )
 
 
 def _channel(

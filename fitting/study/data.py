@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from fitting.study.channels import channel_of, compared_channels, unused_channels
+from fitting.study.limits import limit_warnings
 from fitting.study.noise import noise_deviation
 from fitting.study.study_file import StudyFile
 from twin._checks import InputError
@@ -76,7 +77,8 @@ def read_record(study: StudyFile, name: str) -> RecordData:
     reference = _reference(study, table, record)
     initial = _initial(study, table, record)
     compared = compared_channels(study, table, record, reference)
-    warnings = () if "compare" in table else unused_channels(study, table, record, compared)
+    warnings = limit_warnings(study.model, record, name) if reference is not None else ()
+    warnings += () if "compare" in table else unused_channels(study, table, record, compared)
     deviation, read = {}, []
     for channel in compared:
         options = table.data["channels"].get(channel, {})

@@ -137,6 +137,7 @@ def result_of(
         stop=stop,
         offset=float(solved.offset),
         variance=variance,
+        correlated=correlated is not None,
     )
 
 

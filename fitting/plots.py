@@ -12,6 +12,9 @@ from twin._axes import axes_or_new
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+# Ratio of the widest relative interval to the narrowest from which a linear scale would hide the narrow ones.
+_MUCH = 20.0
+
 
 def plot_comparison(
     times: ArrayLike, measured: ArrayLike, simulated: ArrayLike, *, label: str, unit: str, ax: "Axes | None" = None
@@ -31,7 +34,8 @@ def plot_comparison(
     ax.plot(np.asarray(times), np.asarray(simulated), color="C0", lw=0.8, label="simulated")
     ax.set_xlabel("time [s]")
     ax.set_ylabel(f"{label} [{unit}]")
-    ax.legend(loc="upper right", ncols=2)
+    # Above the axes, where it covers nothing.
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize="small", borderaxespad=0.2)
     ax.margins(x=0)
     return ax
 
@@ -64,9 +68,11 @@ def plot_intervals(
 ) -> "Axes":
     """Confidence intervals relative to the estimates, and the true values where they are known.
 
-    A parameter without an interval is marked, and its name says why: it sits on a bound (a triangle that points against
-    the bound), or the data do not determine it (a hollow circle). Estimates of zero have no relative deviation; theirs
-    is in the parameter's own unit, a hundredth of which is one per cent.
+    Intervals reach over decades, and a parameter near zero, such as an offset, has one of many times its estimate: the
+    abscissa is linear near zero and logarithmic beyond, where they differ much. A parameter without an interval is
+    marked, and its name says why: it sits on a bound (a triangle that points against the bound), or the data do not
+    determine it (a hollow circle). Estimates of zero have no relative deviation; theirs is in the parameter's own unit,
+    a hundredth of which is one per cent.
 
     Args:
         result: fit.
@@ -98,6 +104,11 @@ def plot_intervals(
     ax.set_yticks(rows, [_name_and_remark(result, i, bool(lower[i])) for i in range(count)])
     ax.set_ylim(count - 0.5, -0.5)
     ax.margins(x=0.08)
+    reach = np.maximum(np.abs(low), np.abs(high))[known]
+    reach = reach[reach > 0]
+    if reach.size and reach.max() > _MUCH * reach.min():
+        ax.set_xscale("symlog", linthresh=float(reach.min()))
+        _few_ticks(ax)
     ax.set_xlabel("deviation from the estimate [%]")
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize="small")
     return ax
@@ -127,6 +138,20 @@ def plot_correlation(result: FitResult, *, ax: "Axes | None" = None) -> "Axes":
     ax.set_facecolor("0.9")
     ax.figure.colorbar(image, ax=ax, label="correlation [-]", shrink=0.8)
     return ax
+
+
+def _few_ticks(ax: "Axes") -> None:
+    """Powers of ten in plain numbers, on an axis that is linear near zero."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
+
+    threshold = ax.xaxis.get_transform().linthresh  # pyright: ignore[reportAttributeAccessIssue]
+    farthest = max(abs(one) for one in ax.get_xlim())
+    first, last = int(np.ceil(np.log10(threshold))), int(np.floor(np.log10(farthest)))
+    powers = 10.0 ** np.arange(first, last + 1)[:: max(1, (last - first + 1) // 3)]
+    ax.set_xticks([*(-powers[::-1]), 0.0, *powers])
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _name_and_remark(result: FitResult, i: int, lower: bool) -> str:

@@ -20,7 +20,7 @@ _FILE = NpzFile(
     writer="FitResult.save",
     version=2,
     arrays=("values", "scaled", "scaled_covariance", "factor", "unseen", "active", "residual", "cost_history"),
-    plain=("condition_number", "degrees_of_freedom", "steps", "stop", "offset", "variance", "warning"),
+    plain=("condition_number", "degrees_of_freedom", "steps", "stop", "offset", "variance", "correlated", "warning"),
 )
 
 
@@ -72,6 +72,8 @@ class FitResult:
     """Relative offset at the end: how much of the residual the linear model could still remove."""
     variance: str = "estimated"
     """"estimated" from the residual, or "known" where the weights were taken to be exact."""
+    correlated: bool = False
+    """Whether the covariance allows for errors that hang together from sample to sample."""
     warning: str = ""
     """What else the procedure has to say about this fit."""
 

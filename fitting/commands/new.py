@@ -11,6 +11,8 @@ HELP = "write a commented study file for a drive to begin with"
 
 # What to try first with the file as it is.
 _FIRST = {"rack-pinion": "modes"}
+# What to try first with data, where that is no fit.
+_FIRST_WITH_DATA = {"current-driven-axis": "identify"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,6 +40,7 @@ def run(options: argparse.Namespace) -> Outcome:
     if not file.parent.is_dir():
         raise InputError(f"the folder of {str(file)!r} does not exist. Create it first.")
     file.write_text(text, encoding="utf-8")
-    first = "fit" if options.data else _FIRST.get(options.drive.replace("_", "-"), "simulate")
+    name = options.drive.replace("_", "-")
+    first = _FIRST_WITH_DATA.get(name, "fit") if options.data else _FIRST.get(name, "simulate")
     told = f"{file} written. Adapt it, then for instance: drivetwin {first} {file}"
     return Outcome(told, {"file": str(file)})

@@ -9,6 +9,7 @@ from fitting.controls.held_back import rms_of, short
 from fitting.controls.parts import with_parts
 from fitting.fit import fit
 from fitting.residuals.frequency_response import FrequencyResponseResidual
+from fitting.residuals.linear import LinearResidual
 from fitting.residuals.residual import AbstractResidual
 from fitting.residuals.trajectory import TrajectoryResidual
 from twin._checks import InputError
@@ -119,7 +120,11 @@ def shuffled(evidence: AbstractResidual, *, block: int | None = None, seed: int 
         mixed = dataclasses.replace(measured, values=measured.values[..., order], variance=variance)
         return dataclasses.replace(residual, measured=mixed)
 
-    return with_parts(evidence, record, response)
+    def rows(residual: LinearResidual) -> LinearResidual:
+        order = _order([np.asarray(residual.target)], block, random)
+        return dataclasses.replace(residual, target=residual.target[order])
+
+    return with_parts(evidence, record, response, rows)
 
 
 def _order(rows: list[np.ndarray], block: int | None, random: np.random.Generator) -> np.ndarray:

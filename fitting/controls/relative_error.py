@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike
 
 from fitting.residuals.frequency_response import FrequencyResponseResidual
+from fitting.residuals.linear import LinearResidual
 from fitting.residuals.residual import AbstractResidual, JointResidual
 from fitting.residuals.robust import RobustResidual
 from fitting.residuals.selected import SelectedResidual
@@ -55,6 +56,8 @@ def relative_errors(evidence: AbstractResidual, model: Any) -> dict[str, float]:
         return relative_errors(evidence.residual, model) if np.isfinite(float(evidence.deviation)) else {}
     if isinstance(evidence, TrajectoryResidual):
         return _of_record(evidence, model)
+    if isinstance(evidence, LinearResidual):
+        return {evidence.name: relative_error(np.asarray(evidence.target), np.asarray(_values(evidence, model)))}
     return _of_response(evidence, model) if isinstance(evidence, FrequencyResponseResidual) else {}
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from fitting.controls.parts import with_parts
 from fitting.residuals.frequency_response import FrequencyResponseResidual
+from fitting.residuals.linear import LinearResidual
 from fitting.residuals.residual import AbstractResidual
 from fitting.residuals.trajectory import TrajectoryResidual
 from fitting.residuals.weighted import Weighted
@@ -27,7 +28,7 @@ class Split(NamedTuple):
 
 
 def hold_back(evidence: AbstractResidual, *, share: float = 0.25) -> Split:
-    """Hold back the last part of each record, and evenly spread lines of each frequency response.
+    """Hold back the last part of each record or set of rows, and evenly spread lines of each frequency response.
 
     A record is cut, not thinned: neighbouring samples know of each other, and would give away what is held back. Of a
     response every few lines are held back, as a model can not be asked what lies beyond its band. Other evidence, such
@@ -42,9 +43,15 @@ def hold_back(evidence: AbstractResidual, *, share: float = 0.25) -> Split:
     """
     if not 0 < share <= 0.5:
         raise InputError(f"share must be above 0 and at most 0.5, but is {share}.")
-    fitted = with_parts(evidence, lambda r: _beginning(r, share), lambda r: _lines(r, share)[0])
+    fitted = with_parts(
+        evidence, lambda r: _beginning(r, share), lambda r: _lines(r, share)[0], lambda r: _rows(r, share)[0]
+    )
     kept = with_parts(
-        evidence, lambda r: _end(r, share), lambda r: _lines(r, share)[1], lambda other: Weighted(other, jnp.inf)
+        evidence,
+        lambda r: _end(r, share),
+        lambda r: _lines(r, share)[1],
+        lambda r: _rows(r, share)[1],
+        lambda other: Weighted(other, jnp.inf),
     )
     return Split(fitted, kept)
 
@@ -70,6 +77,16 @@ def _end(residual: TrajectoryResidual, share: float) -> TrajectoryResidual:
     # An infinite deviation is a weight of zero.
     early = jnp.arange(residual.times.size) < _cut(residual, share)
     return dataclasses.replace(residual, deviation=tuple(jnp.where(early, jnp.inf, sd) for sd in residual.deviation))
+
+
+def _rows(residual: LinearResidual, share: float) -> tuple[LinearResidual, ...]:
+    count = residual.target.size
+    cut = round((1 - share) * count)
+    _check_parts("rows", cut, count - cut)
+    return tuple(
+        dataclasses.replace(residual, regressors=residual.regressors[part], target=residual.target[part])
+        for part in (slice(cut), slice(cut, None))
+    )
 
 
 def _lines(residual: FrequencyResponseResidual, share: float) -> tuple[FrequencyResponseResidual, ...]:

@@ -157,7 +157,7 @@ def friction_curve(
     means, rejected = [], []
     for i, record in enumerate(records):
         name, speed, amperes = _samples(record, i, velocity, current)
-        fault = _fault(speed, tolerance)
+        fault = constant_speed_fault(speed, tolerance)
         if fault and not skip:
             raise InputError(
                 f"{name} is not at constant speed: {fault}. Cut the constant part out by Record.slice, or leave such "
@@ -200,8 +200,13 @@ def _samples(record: object, i: int, velocity: str, current: str) -> tuple[str, 
     return name, np.broadcast_to(speed, amperes.shape), amperes
 
 
-def _fault(speed: np.ndarray, tolerance: float) -> str:
-    """Why a motion is not at constant speed; empty if it is."""
+def constant_speed_fault(speed: np.ndarray, tolerance: float) -> str:
+    """Why a motion is not at constant speed; empty if it is.
+
+    Args:
+        speed: speeds in order of time (samples,), at least 16 [rad/s].
+        tolerance: as in `friction_curve`.
+    """
     mean, error = _mean(speed)
     if abs(mean) <= _CHANCE * error or mean == 0:
         return f"its mean speed of {mean:.3g} rad/s cannot be told from standstill"

@@ -28,6 +28,8 @@ class Compared(NamedTuple):
     """Simulated samples (samples,)."""
     deviation: np.ndarray | None
     """Standard deviation of the noise, one number or one for each sample; None where it is not known."""
+    speed: tuple[str, str, np.ndarray] | None = None
+    """Name, unit and samples of a speed at these times, where the record's own is not to be taken."""
 
     @property
     def name(self) -> str:

@@ -9,7 +9,7 @@ from fitting.identifiability import IdentifiabilityReport
 from fitting.multistart import MultistartResult
 from fitting.profile import ProfileResult
 from fitting.report.asked import Asked, asked_section
-from fitting.report.compared import compared
+from fitting.report.compared import Compared, compared
 from fitting.report.comparison import comparison_section
 from fitting.report.content import Report, Section
 from fitting.report.control_results import controls_section
@@ -23,7 +23,7 @@ from fitting.report.ranking import ranking_section
 from fitting.report.residuals import residuals_section
 from fitting.report.responses import responses_section
 from fitting.report.warnings import warnings_of
-from fitting.result import FitResult
+from fitting.result import Estimate, FitResult
 from sensitivity.derivative_result import DerivativeMeasures
 from sensitivity.sobol_result import SobolIndices
 from twin.frf import FRF
@@ -45,6 +45,8 @@ def fit_report(
     profiles: ProfileResult | None = None,
     ranking: SobolIndices | DerivativeMeasures | None = None,
     controls: Sequence[Control] = (),
+    series: Sequence[Compared] = (),
+    derived: Mapping[str, Estimate] | None = None,
     remarks: Mapping[str, Sequence[str]] | None = None,
     warnings: Sequence[str] = (),
     more: Sequence[Section] = (),
@@ -67,6 +69,8 @@ def fit_report(
         profiles: profile likelihoods of the fit.
         ranking: sensitivity study, `SobolIndices` or `DerivativeMeasures`.
         controls: controls of the fit, from `fitting.controls`.
+        series: further measured and modelled samples, of records that are among `records`.
+        derived: quantities that follow from the parameters, by name.
         remarks: remarks on the preparation of each record.
         warnings: what a reader has to know even before what the fit itself warns of.
         more: further sections, for the end of the page.
@@ -76,14 +80,14 @@ def fit_report(
         InputError: a simulated channel that was not measured, or of another length.
     """
     records, responses = dict(records or {}), dict(responses or {})
-    series = compared(records, simulated or {}, deviation)
+    series = (*compared(records, simulated or {}, deviation), *series)
     sections = [records_section(records, remarks)] if records else []
     if series:
         sections += [comparison_section(series), residuals_section(series, records)]
     if responses:
         measured, model = ({name: pair[i] for name, pair in responses.items()} for i in (0, 1))
         sections.append(responses_section(measured, model, response_units))
-    sections += [parameters_section(result, identifiability), correlation_section(result)]
+    sections += [parameters_section(result, identifiability, derived), correlation_section(result)]
     sections += [profiles_section(profiles, result)] if profiles is not None else []
     sections += [many_starts_section(many)] if many is not None else []
     sections += [ranking_section(ranking)] if ranking is not None else []

@@ -1,22 +1,29 @@
 """Section: the parameters."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from fitting.identifiability import IDENTIFIED, IdentifiabilityReport
 from fitting.report.content import Bar, Cell, Section, Table
 from fitting.report.numbers import given, plain, together, with_error
-from fitting.result import FitResult
+from fitting.result import Estimate, FitResult
 
 # A line may end before it, not after.
 _TOGETHER = "±\u00a0"
 
 
-def parameters_section(result: FitResult, identifiability: IdentifiabilityReport | None = None) -> Section:
+def parameters_section(
+    result: FitResult,
+    identifiability: IdentifiabilityReport | None = None,
+    derived: Mapping[str, Estimate] | None = None,
+) -> Section:
     """Estimates with standard errors, intervals, their place within the bounds, and what the data say about each.
 
     Args:
         result: the fit.
         identifiability: verdicts on its parameters, if there are any.
+        derived: quantities that follow from the parameters, by name.
     """
     low, high = result.intervals().T
     errors = result.standard_errors
@@ -36,16 +43,32 @@ def parameters_section(result: FitResult, identifiability: IdentifiabilityReport
             )
         )
     head = ("Parameter", "Estimate ± standard error", "Unit", "95 % interval", "Between its bounds", "Verdict")
+    tables = [Table(head, tuple(rows), "Estimates")]
+    if derived:
+        cells = [
+            (Cell(name), Cell(with_error(one.value, one.standard_error), "number"), Cell(one.unit, "unit"))
+            for name, one in derived.items()
+        ]
+        tables.append(Table(("Quantity", "Value ± standard error", "Unit"), tuple(cells), "What follows from them"))
     remarks = [result.message]
     if identifiability is not None:
         remarks.append(identifiability.message)
     return Section(
         "Parameters",
         text="The bar is the way from the lower to the upper bound on the parameter's scale, the dot the estimate, the "
-        "band its 95 % interval.",
-        tables=(Table(head, tuple(rows), "Estimates"),),
+        f"band its 95 % interval. {_errors_told(result)}",
+        tables=tuple(tables),
         remarks=tuple(remarks),
     )
+
+
+def _errors_told(result: FitResult) -> str:
+    """Which kind of standard error is shown."""
+    if result.variance == "known":
+        return "Standard errors by the standard deviations of the data as they were given."
+    if result.correlated:
+        return "Standard errors allow for errors that hang together from sample to sample."
+    return "Standard errors count errors as independent from sample to sample."
 
 
 def _bar(result: FitResult, i: int) -> Cell:

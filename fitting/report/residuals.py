@@ -33,8 +33,8 @@ def residuals_section(series: Sequence[Compared], records: Mapping[str, Record])
     return Section(
         "Residuals",
         text="What is left over should be noise: without a shape over time, normal, without memory, and with a flat "
-        "spectrum. A shape over the speed points to friction. Where deviations are given, residuals are in units of "
-        "them.",
+        "spectrum. A shape over the speed points to friction. Over time they are in the "
+        "channel's unit, at the right and elsewhere in units of the standard deviation, where one is given.",
         figures=tuple(figures),
         remarks=tuple(remarks),
     )
@@ -48,7 +48,7 @@ def _figures(one: Compared, speed: tuple[str, str, np.ndarray] | None) -> list[F
     name = one.name
     figures = [
         Figure(
-            partial(_over_time, one.times, values, f"{one.channel}\nresidual [{unit}]"),
+            partial(_over_time, one, unit),
             f"Residual of {name} over time",
             f"{name}: residual over time.",
             wide=True,
@@ -86,6 +86,8 @@ def _figures(one: Compared, speed: tuple[str, str, np.ndarray] | None) -> list[F
 
 def _speed(one: Compared, series: Sequence[Compared], record: Record) -> tuple[str, str, np.ndarray] | None:
     """A speed along the record: simulated ones first, as they are free of noise."""
+    if one.speed is not None:
+        return one.speed
     for other in series:
         if other.record == one.record and other.unit in _SPEEDS:
             return other.channel, other.unit, other.simulated
@@ -95,14 +97,22 @@ def _speed(one: Compared, series: Sequence[Compared], record: Record) -> tuple[s
     return None
 
 
-def _over_time(times: np.ndarray, values: np.ndarray, label: str, axes: np.ndarray) -> None:
-    ax = axes[0]
+def _over_time(one: Compared, unit: str, axes: np.ndarray) -> None:
+    """In the channel's unit; in units of the standard deviation at the right, where it is one number."""
+    ax, scale = axes[0], one.deviation
+    single = scale is not None and scale.ndim == 0
+    values = one.weighted if scale is not None and not single else one.error
+    assert values is not None
     kept = thinned(ax, values)
-    ax.plot(times[kept], values[kept], color="C0", lw=0.6)
+    ax.plot(one.times[kept], values[kept], color="C0", lw=0.6)
     ax.axhline(0, color="0.4", lw=0.6)
     ax.set_xlabel("time [s]")
-    ax.set_ylabel(label)
+    ax.set_ylabel(f"{one.channel}\nresidual [{one.unit if single or scale is None else unit}]")
     ax.margins(x=0)
+    if single and scale is not None:
+        sigma = float(scale)
+        right = ax.secondary_yaxis("right", functions=(lambda y: y / sigma, lambda y: y * sigma))
+        right.set_ylabel("over deviation [-]")
 
 
 def _histogram(values: np.ndarray, unit: str, axes: np.ndarray) -> None:

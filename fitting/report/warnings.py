@@ -48,7 +48,7 @@ def warnings_of(
         *[
             text
             for name, values in (residuals or {}).items()
-            for text in _memory(name, np.asarray(values, dtype=float))
+            for text in _memory(name, np.asarray(values, dtype=float), result.correlated)
         ],
         *([result.warning] if result.warning else []),
     ]
@@ -65,8 +65,8 @@ def _parameters(result: FitResult, report: IdentifiabilityReport | None) -> list
     bound = {path for path, flag in zip(result.space.paths, result.active, strict=True) if flag}
     groups: tuple[tuple[str, ...], ...] = ()
     if report is not None:
-        unseen |= {v.path for v in report.verdicts if v.kind == NOT_SEEN}
-        bound = {v.path for v in report.verdicts if v.kind == AT_BOUND}
+        unseen |= {v.path for v in report.verdicts if v.kind == NOT_SEEN} - bound
+        bound |= {v.path for v in report.verdicts if v.kind == AT_BOUND}
         groups = report.groups
     found = []
     if unseen:
@@ -137,7 +137,7 @@ def _size(result: FitResult) -> list[str]:
     ]
 
 
-def _memory(name: str, values: np.ndarray) -> list[str]:
+def _memory(name: str, values: np.ndarray, allowed: bool) -> list[str]:
     values = values[np.isfinite(values)] if values.ndim == 1 else values.ravel()
     if values.size < 2 * _LAGS or values.std() == 0:
         return []
@@ -149,11 +149,15 @@ def _memory(name: str, values: np.ndarray) -> list[str]:
     if abs(correlation[lag]) <= _MEMORY:
         return []
     size = f"{correlation[lag]:.2f}".replace("-", "−")
-    return [
+    found = (
         f"The residual of {name} is far from noise (autocorrelation {size} at {lag} "
-        f"{'sample' if lag == 1 else 'samples'}). The model lacks something, and standard errors that count its errors "
-        "as independent are too small: look at the residual for its shape, mend the model, or fit with correlated "
-        "errors."
+        f"{'sample' if lag == 1 else 'samples'}). The model lacks something"
+    )
+    if allowed:
+        return [f"{found}: look at the residual for its shape, and mend the model."]
+    return [
+        f"{found}, and standard errors that count its errors as independent are too small: look at the residual for "
+        "its shape, mend the model, or fit with correlated errors."
     ]
 
 

@@ -11,7 +11,7 @@ from twin.parameters import ParameterSpace
 
 
 class LinearResidual(AbstractResidual):
-    """W·x - y, with x the values of some parameters in SI."""
+    """W·x - y, with x the values of some parameters in SI; its rows are in the order of time."""
 
     regressors: Float[Array, "rows parameters"] = eqx.field(converter=as_array)
     """Regressor matrix W, one column per parameter."""
@@ -19,6 +19,8 @@ class LinearResidual(AbstractResidual):
     """Measured y."""
     space: ParameterSpace
     """The parameters that the columns belong to."""
+    name: str = eqx.field(static=True, default="target")
+    """Name of what was measured."""
 
     def __check_init__(self):
         rows, columns = self.regressors.shape

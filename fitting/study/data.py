@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from fitting.study.channels import channel_of, compared_channels, unused_channels
+from fitting.study.limits import limit_warnings
 from fitting.study.noise import noise_deviation
 from fitting.study.study_file import StudyFile
 from twin._checks import InputError
@@ -76,7 +77,8 @@ def read_record(study: StudyFile, name: str) -> RecordData:
     reference = _reference(study, table, record)
     initial = _initial(study, table, record)
     compared = compared_channels(study, table, record, reference)
-    warnings = () if "compare" in table else unused_channels(study, table, record, compared)
+    warnings = limit_warnings(study.model, record, name) if reference is not None else ()
+    warnings += () if "compare" in table else unused_channels(study, table, record, compared)
     deviation, read = {}, []
     for channel in compared:
         options = table.data["channels"].get(channel, {})
@@ -90,7 +92,7 @@ def read_record(study: StudyFile, name: str) -> RecordData:
             )
             continue
         unit = record.units[channel]
-        quantity = _ofchannel_of(table, channel, "deviation", lambda w=written, u=unit: parse_quantity(w, (u,)))
+        quantity = _for_channel(table, channel, "deviation", lambda w=written, u=unit: parse_quantity(w, (u,)))
         deviation[channel] = quantity.value
         if not quantity.value > 0:
             raise study.document.error(
@@ -250,7 +252,7 @@ def _initial(study: StudyFile, table: TomlTable, record: Record) -> dict[str, fl
     return found
 
 
-def _ofchannel_of(table: TomlTable, channel: str, name: str, make: Any) -> Any:
+def _for_channel(table: TomlTable, channel: str, name: str, make: Any) -> Any:
     try:
         return make()
     except InputError as error:

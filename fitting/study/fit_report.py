@@ -9,6 +9,7 @@ import numpy as np
 from fitting.report.asked import Asked
 from fitting.report.fit_report import fit_report
 from fitting.report.page import write_report
+from fitting.study.derived import derived_of
 from fitting.study.free_parameters import free_text
 from fitting.study.study_file import StudyFile
 from fitting.study.units_of_outputs import output_units
@@ -51,6 +52,7 @@ def write_fit_report(
         controls=found.controls,
         remarks=_by_data(found),
         warnings=(*found.hints, *found.data.warnings),
+        derived=derived_of(found.result),
     )
     _draw(study, found, out)
     return write_report(out / "report.html", report), report.warnings
@@ -83,7 +85,8 @@ def _draw(study: StudyFile, found: "FitRun", out: Path) -> None:
         for ax in axes[:-1, 0]:
             ax.set_xlabel("")
         axes[-1, 0].set_xlabel("time [s]")
-        axes[0, 0].set_title(f"{study.title}: {one.name}" + (" (held back)" if one.name in found.held else ""))
+        title = f"{study.title}: {one.name}" + (" (held back)" if one.name in found.held else "")
+        axes[0, 0].set_title(title, loc="left")
         save_figure(figure, out / f"fit_{one.name}.png")
     ax: Any = plot_intervals(found.result)
     ax.set_title(study.title)

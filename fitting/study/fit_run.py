@@ -23,6 +23,7 @@ from fitting.identifiability import IdentifiabilityReport, identifiability
 from fitting.multistart import MultistartResult, multistart
 from fitting.residuals.residual import AbstractResidual
 from fitting.result import FitResult
+from fitting.study.derived import derived_of
 from fitting.study.evidence import (
     FIT_KEYS,
     StudyData,
@@ -33,7 +34,7 @@ from fitting.study.evidence import (
 )
 from fitting.study.fit_report import write_fit_report
 from fitting.study.lowered_noise import lowered_noise
-from fitting.study.shown import shown_estimates
+from fitting.study.shown import shown_derived, shown_estimates
 from fitting.study.study_file import StudyFile
 from fitting.study.timing import timing_hint
 from fitting.study.written import write_fitted, write_run
@@ -243,6 +244,7 @@ def summary_of(found: FitRun) -> dict[str, Any]:
         "status": result.message,
         "converged": result.success,
         "parameters": parameters,
+        "derived": {name: one._asdict() for name, one in derived_of(result).items()},
         "rms": result.rms,
         "degrees_of_freedom": result.degrees_of_freedom,
         "steps": result.steps,
@@ -264,7 +266,7 @@ def summary_of(found: FitRun) -> dict[str, Any]:
 
 def _text(study: StudyFile, found: FitRun, summary: dict[str, Any], report: Path) -> str:
     result = found.result
-    lines = [study.title, shown_estimates(result), result.message]
+    lines = [study.title, shown_estimates(result), *shown_derived(derived_of(result)), result.message]
     if found.many is not None:
         lines.append(found.many.message)
     for name, errors in summary["relative_errors"].items():

@@ -2,6 +2,7 @@
 
 import importlib
 import pkgutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +10,11 @@ from fitting.commands._outcome import Outcome
 from fitting.report.asked import Asked
 from fitting.report.fit_report import fit_report
 from fitting.report.page import write_report
+from fitting.result import FitResult
 from fitting.study import procedures
+from fitting.study.procedures._found import Found
 from fitting.study.study_file import StudyFile
-from fitting.study.written import write_run
+from fitting.study.written import versions, write_run
 from twin._checks import InputError
 from twin.io.toml_document import unknown
 
@@ -46,20 +49,33 @@ def run_identify(study: StudyFile, out: Path) -> Outcome:
         if str(study.document.file) in str(error):
             raise
         raise table.error("procedure", f"{name}: {error}") from error
-    whole = write_run(study, out, "identify", {"procedure": name, **found.summary})
     text = f"{study.title}: {procedure.HELP}\n{found.text}"
     if found.result is None:
-        return Outcome(f"{text}\nResults in {out}", whole)
+        return Outcome(f"{text}\nResults in {out}", write_run(study, out, "identify", _summary(name, found, ())))
     report = fit_report(
         title=study.title,
-        asked=Asked(f"{name}: {procedure.HELP}.", "", study.document.text, whole["versions"], {"Procedure": name}),
+        asked=Asked(f"{name}: {procedure.HELP}.", "", study.document.text, versions(), {"Procedure": name}),
         result=found.result,
         responses=found.responses,
         records=found.records,
         identifiability=found.verdicts,
         many=found.many,
         controls=found.controls,
+        series=found.series,
+        derived=found.derived,
+        remarks=found.remarks,
     )
     found.result.save(out / "fit.npz")
     page = write_report(out / "report.html", report)
-    return Outcome(f"{text}\nReport: {page}", whole, code=0 if found.result.success else 1)
+    whole = write_run(study, out, "identify", _summary(name, found, report.warnings))
+    told = [text, *(f"Warning: {warning}" for warning in report.warnings), f"Report: {page}"]
+    return Outcome("\n".join(told), whole, code=0 if _trusted(found.result, found) else 1)
+
+
+def _summary(name: str, found: Found, warnings: Sequence[str]) -> dict[str, Any]:
+    return {"procedure": name, **found.summary, "warnings": list(warnings)}
+
+
+def _trusted(result: FitResult, found: Found) -> bool:
+    """Whether a result may be used: converged, not held by its bounds alone, and no control failed."""
+    return result.success and not result.active.all() and all(control.passed for control in found.controls)

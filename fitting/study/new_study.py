@@ -87,6 +87,8 @@ def _with_channels(rest: str, data: Path, folder: Path, outputs: tuple[str, ...]
     new += [f"[data.{block.group(1)}.channels]        # names on the left must be those of the model's outputs:"]
     new += [f"# {', '.join(outputs)}"]
     new += [f"# in the example: {line}" for line in block.group(3).split("\n")]
+    named = {*outputs, *(line.split(" = ")[0] for line in block.group(3).split("\n"))}
+    channels = [line if line.split(" = ")[0] in named else f"# not in the model: {line}" for line in channels]
     return rest[: block.start()] + "\n".join([*new, *channels]) + rest[block.end() :]
 
 

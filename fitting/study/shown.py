@@ -1,10 +1,11 @@
 """Tables as text."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fitting.result import FitResult
+from fitting.result import Estimate, FitResult
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,3 +42,16 @@ def shown_estimates(result: FitResult) -> str:
             table.at[path, one] = f"{float(table.at[path, one]):.{digits}g}"
         table.at[path, "standard error"] = f"{error:.2g}"
     return table.to_string()
+
+
+def shown_derived(derived: Mapping[str, Estimate]) -> list[str]:
+    """A line for each quantity that follows from the estimates.
+
+    Args:
+        derived: quantities by name.
+    """
+    errors = {
+        name: f", standard error {one.standard_error:.2g}" if np.isfinite(one.standard_error) else ""
+        for name, one in derived.items()
+    }
+    return [f"{name} {one.value:.5g} {one.unit}{errors[name]}" for name, one in derived.items()]

@@ -164,3 +164,19 @@ def test_axes_given_are_used_and_counted(tmp_path):
     assert len(grid_or_new(None, 4)[0].figure.axes) == 4
     save_figure(figure, tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 1000
+
+
+def test_an_estimate_near_zero_hides_no_other(result):
+    near = dataclasses.replace(result, values=result.values * [1e-4, 1.0], scaled=result.scaled * [1e-4, 1.0])
+    ax = plot_intervals(near)
+    assert ax.get_xscale() == "symlog"
+    ends = [segment[:, 0] for segment in ax.collections[0].get_segments()]
+    shown = [np.ptp(ax.transData.transform([[x, 0.0] for x in one])[:, 0]) for one in ends]
+    assert min(shown) > 0.05 * max(shown)
+    assert all(float(tick.get_text()) == tick.get_position()[0] for tick in ax.get_xticklabels())
+
+
+def test_the_legend_covers_no_curve():
+    ax = plot_comparison(X, Y, Y + 1, label="position", unit="m")
+    ax.figure.canvas.draw()
+    assert ax.get_legend().get_window_extent().y0 >= ax.get_window_extent().y1

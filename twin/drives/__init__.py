@@ -9,6 +9,7 @@ from twin.drives.ball_screw_modes import screw_elasticities as screw_elasticitie
 from twin.drives.ball_screw_modes import spring_deformations as spring_deformations
 from twin.drives.ball_screw_modes import structural_damping as structural_damping
 from twin.drives.ball_screw_state import BallScrewState as BallScrewState
+from twin.drives.current_driven_axis import CurrentDrivenAxis as CurrentDrivenAxis
 from twin.drives.dc_motor import DcMotor as DcMotor
 from twin.drives.driven_table import DrivenTable as DrivenTable
 from twin.drives.driven_table import DrivenTableInputs as DrivenTableInputs

@@ -1,12 +1,13 @@
 """What a procedure found."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from fitting.controls import Control
 from fitting.identifiability import IdentifiabilityReport
 from fitting.multistart import MultistartResult
-from fitting.result import FitResult
+from fitting.report.compared import Compared
+from fitting.result import Estimate, FitResult
 from twin.frf import FRF
 from twin.record import Record
 
@@ -30,3 +31,9 @@ class Found(NamedTuple):
     """All starts, for the report."""
     controls: Sequence[Control] = ()
     """Controls, for the report."""
+    series: Sequence[Compared] = ()
+    """Measured and modelled samples, for the report."""
+    remarks: Mapping[str, Sequence[str]] | None = None
+    """Remarks on each record, for the report."""
+    derived: Mapping[str, Estimate] | None = None
+    """Quantities that follow from the parameters, for the report."""

@@ -77,6 +77,10 @@ def test_residuals_with_a_memory(good):
     (text,) = warnings_of(good, residuals={"run: speed": slow, "run: force": NOISE})
     assert "The residual of run: speed is far from noise (autocorrelation 0.9" in text
     assert "mend the model" in text
+    assert "fit with correlated errors" in text
+    (text,) = warnings_of(dataclasses.replace(good, correlated=True), residuals={"run: speed": slow})
+    assert "mend the model" in text
+    assert "correlated errors" not in text
 
 
 def test_controls_that_failed(good):

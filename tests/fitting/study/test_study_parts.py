@@ -7,6 +7,7 @@ import pytest
 from fitting.demo import demo_axis, demo_reference, make_record
 from fitting.residuals.set_leaves import WithLeaves
 from fitting.residuals.trajectory import TrajectoryResidual
+from fitting.study.limits import limit_warnings
 from fitting.study.model_modes import OperatingPoint, elastic_modes, linear_model
 from fitting.study.noise import noise_deviation
 from fitting.study.outputs import KNOWN, parse_outputs
@@ -17,6 +18,7 @@ from twin.drives import TwoMass, leipe_drive, mauro_axis
 from twin.laws import CoulombViscousFriction, LuGreFriction, ViscousFriction
 from twin.modal import modes
 from twin.paths import get_leaf, set_leaves
+from twin.record import Record
 
 
 @pytest.mark.parametrize("deviation", [1e-6, 1e-3])
@@ -109,3 +111,14 @@ offset = { lower = "-5 N", upper = "5 N" }
     for path, value in values.items():
         assert float(get_leaf(again, path)) == value
     assert "# weighed" in file.read_text()
+
+
+@pytest.mark.parametrize(("largest", "told"), [(9.9, 0), (10.2, 0), (27.0, 1)])
+def test_a_command_beyond_the_limit_is_told(largest, told):
+    command = largest * np.sin(np.linspace(0.0, 7.0, 200))
+    record = Record.create(1e-3 * np.arange(200), {"command": command}, {"command": "A"})
+    found = limit_warnings(demo_axis(), record, "run1")
+    assert len(found) == told
+    assert limit_warnings(demo_axis().plant, record, "run1") == ()
+    if told:
+        assert "reaches 27 A, the model cuts at 10 A" in found[0]

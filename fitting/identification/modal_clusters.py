@@ -23,6 +23,8 @@ from fitting.identification.modal_refinement import ModalProblem, factored
 LEAST_CLUSTERS = 6
 # Share of the largest curvature below which nothing is known of a direction.
 _UNSEEN = 1e-13
+# Standard deviations by which gains must scatter more than noise makes them before it is believed.
+_ASKED = 3.0
 
 
 def cluster_deviation(problem: ModalProblem, model: ModalPoles) -> Float[np.ndarray, "parameters"] | None:
@@ -58,3 +60,35 @@ def cluster_deviation(problem: ModalProblem, model: ModalPoles) -> Float[np.ndar
     inverse = np.where(values > _UNSEEN * values.max(), 1 / np.maximum(values, 1e-300), 0.0)
     moved = scores.reshape(clusters, count) / size @ (turn * inverse) @ turn.T / size
     return np.sqrt(np.sum(moved**2, axis=0) * clusters / (clusters - 1))
+
+
+def gain_scatter(problem: ModalProblem, model: ModalPoles, power: float) -> float:
+    """Standard deviation of the gains of single responses, told from what the modes leave of them [-].
+
+    A response that is too large by a share leaves that share of itself. Of shapes and participations each takes up a
+    gain that all its responses have in common, which leaves (outputs - 1)·(inputs - 1) to tell by. Where each mode is
+    driven by an excitation of its own the shapes take up more, and the deviation is too small.
+
+    Args:
+        problem: measured responses with their weights.
+        model: poles and participations of least squares.
+        power: variance of the weighted residuals.
+
+    Returns:
+        The deviation; 0 where noise explains what is left, and where there is one excitation, by which gains and
+        shapes cannot be told apart.
+    """
+    outputs, inputs = problem.size.size, model.inputs
+    freedom = (outputs - 1) * (inputs - 1)
+    if outputs * inputs < LEAST_CLUSTERS or freedom < 1:
+        return 0.0
+    weight = problem.profile * problem.size[:, None]
+    rest = problem.linearised(model).residual
+    rows = (outputs, inputs, -1)
+    there = (weight * problem.measured + rest).reshape(rows)  # responses of the modes, weighted
+    size = np.maximum(np.sum(there**2, axis=2), 1e-300)
+    gains = np.sum(there * rest.reshape(rows), axis=2) / size
+    noise = power / size
+    if np.sum(gains**2 / noise) < freedom + _ASKED * np.sqrt(2 * freedom):
+        return 0.0
+    return float(np.sqrt(max(np.sum(gains**2 - noise * freedom / gains.size), 0.0) / freedom))

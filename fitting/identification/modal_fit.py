@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fitting.identification.modal_basis import ModalKind, modal_basis, shapes_of, solve_linear
-from fitting.identification.modal_clusters import cluster_deviation
+from fitting.identification.modal_clusters import cluster_deviation, gain_scatter
 from fitting.identification.modal_noise import noise_deviation
 from fitting.identification.modal_poles import ModalPoles
 from fitting.identification.modal_refinement import ModalProblem, factored, refined
@@ -114,7 +114,7 @@ def _with_clusters(result: FitResult, problem: ModalProblem) -> tuple[FitResult,
 
 
 def _shape_errors(problem: ModalProblem, result: FitResult, coefficients: np.ndarray) -> np.ndarray:
-    """Standard errors of shapes: their own for given poles, and that of the poles passed on."""
+    """Standard errors of shapes: their own for given poles, that of the poles passed on, and of gains that scatter."""
     model = result.model
     columns = problem.columns(model)
     slopes, places = problem.stacked_slopes(model)
@@ -123,6 +123,10 @@ def _shape_errors(problem: ModalProblem, result: FitResult, coefficients: np.nda
     square = 2 * result.cost / result.degrees_of_freedom
     scale = max(1.0, square) if result.variance == "known" else square
     errors = np.empty((coefficients.shape[0], modes), dtype=complex)
+    # A shape averages the gains of its responses, each as strongly as its excitation drives the mode.
+    drive = np.abs(model.participations) ** 2
+    averaged = np.sqrt(np.sum(drive**2, axis=1)) / np.sum(drive, axis=1)
+    gain = gain_scatter(problem, model, square) * averaged
     for own in problem.groups():
         profile = problem.profile[own[0]][:, None]
         left, factor, size = factored(profile * columns)
@@ -132,6 +136,7 @@ def _shape_errors(problem: ModalProblem, result: FitResult, coefficients: np.nda
         for row in own:
             passed = np.einsum("kpa,pa->kp", moved, coefficients[row][places])
             variance = alone / problem.size[row] ** 2 + np.einsum("kp,pq,kq->k", passed, covariance, passed)
+            variance[: 2 * modes] += (np.tile(gain, 2) * coefficients[row, : 2 * modes]) ** 2
             errors[row] = shapes_of(np.sqrt(variance)[None], modes)[0]
     return errors
 

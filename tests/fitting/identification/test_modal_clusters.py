@@ -74,6 +74,20 @@ def test_the_deviation_is_that_of_the_responses_own_scores():
     np.testing.assert_allclose(found, np.sqrt(np.diag(covariance)), rtol=0.1)
 
 
+@pytest.mark.parametrize("size", [0.0, 0.02])
+def test_errors_of_shapes_allow_for_gains_that_scatter(size):
+    """Against the true shapes; errors common to all points of a mode are in the scale, and left out."""
+    shapes, scores = shapes_for(3, 12), []
+    for seed in range(6):
+        frf, _ = response(
+            FREQUENCY[[0, 3, 5]], RATIO[[0, 3, 5]], shapes, LINES[::2], inputs=(0, 1), noise=0.001, seed=seed
+        )
+        analysis = modal_analysis(scattered(frf, size, seed), modes=3, order=8)
+        scale = np.sum(analysis.shapes * shapes, axis=0) / np.sum(shapes**2, axis=0)
+        scores.append(np.abs(analysis.shapes / scale - shapes) / (analysis.shape_errors / np.abs(scale)))
+    assert 0.5 < np.sqrt(np.mean(np.square(scores))) < 1.5
+
+
 def test_too_few_responses_say_nothing():
     problem, result = problem_and_fit((0,), LEAST_CLUSTERS - 1)
     assert cluster_deviation(problem, result.model) is None

@@ -8,13 +8,12 @@ from contextlib import contextmanager
 
 @contextmanager
 def ticking(what: str) -> Iterator[None]:
-    """Show on a terminal what runs and for how long; elsewhere say once what runs.
+    """Show on a terminal what runs and for how long; elsewhere say nothing.
 
     Args:
         what: what runs.
     """
     if not sys.stderr.isatty():
-        print(f"{what} ...", file=sys.stderr, flush=True)
         yield
         return
     from tqdm import tqdm

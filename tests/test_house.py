@@ -1,6 +1,7 @@
 """The house rules: who imports whom, how classes are built, how long files are, and what an import does not do."""
 
 import ast
+import builtins
 import importlib
 import inspect
 import pkgutil
@@ -71,6 +72,33 @@ def test_files_can_be_held_in_ones_head(room):
     for path in [*sources(room), *sources("tests")]:
         lines = len(path.read_text(encoding="utf-8").splitlines())
         assert lines <= 300, f"{path.relative_to(ROOT)} has {lines} lines"
+
+
+def bound_names(tree):
+    """Names that a file binds anywhere, whatever the scope."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield from ((one.asname or one.name).split(".")[0] for one in node.names)
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            yield node.name
+        elif isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+            yield node.id
+        elif isinstance(node, ast.arg):
+            yield node.arg
+        elif isinstance(node, ast.ExceptHandler | ast.MatchAs | ast.MatchStar) and node.name:
+            yield node.name
+        elif isinstance(node, ast.MatchMapping) and node.rest:
+            yield node.rest
+
+
+@pytest.mark.parametrize("room", ["twin", "sensitivity", "fitting", "tests"])
+def test_no_name_is_unknown(room):
+    """Linters cannot tell: names of dimensions in annotations are none to them."""
+    for path in sorted((ROOT / room).rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        known = {*bound_names(tree), *dir(builtins), "__file__", "__name__", "__path__"}
+        used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+        assert used <= known, f"{path.relative_to(ROOT)}: {used - known}"
 
 
 def own_classes():

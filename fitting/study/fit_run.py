@@ -21,6 +21,7 @@ from fitting.controls.relative_error import relative_error
 from fitting.fit import fit
 from fitting.identifiability import IdentifiabilityReport, identifiability
 from fitting.multistart import MultistartResult, multistart
+from fitting.provenance import versions
 from fitting.residuals.residual import AbstractResidual
 from fitting.result import FitResult
 from fitting.study.derived import derived_of

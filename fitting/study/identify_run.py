@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fitting.commands._outcome import Outcome
+from fitting.provenance import versions
 from fitting.report.asked import Asked
 from fitting.report.fit_report import fit_report
 from fitting.report.page import write_report
@@ -14,7 +15,7 @@ from fitting.result import FitResult
 from fitting.study import procedures
 from fitting.study.procedures._found import Found
 from fitting.study.study_file import StudyFile
-from fitting.study.written import versions, write_run
+from fitting.study.written import write_run
 from twin._checks import InputError
 from twin.io.toml_document import unknown
 

@@ -5,6 +5,7 @@ import importlib
 import os
 import pkgutil
 import sys
+import traceback
 from collections.abc import Sequence
 
 from fitting import commands
@@ -21,7 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns:
         The exit code: 0 done, 1 done with a result that must not be trusted, 2 input that cannot be used, 3 a study
-        that was interrupted and goes on with the same command, 130 stopped by Ctrl-C.
+        that was interrupted and goes on with the same command, 4 an error of drivetwin itself, 130 stopped by Ctrl-C.
     """
     options = _parser().parse_args(arguments)
     make_small_loops_one_function()
@@ -48,6 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _told(
             "stopped by Ctrl-C; what a study had stored is kept, and the same command goes on from there.", 130
         )
+    except Exception:  # the program's own fault, which must not pass for a result
+        traceback.print_exc()
+        return _told("this is an error of drivetwin itself. Please report it with the lines above.", 4)
     else:
         return outcome.code
     return 0

@@ -5,7 +5,7 @@ import argparse
 from fitting.commands._outcome import Outcome
 from fitting.commands._study_run import add_study, run_study
 
-HELP = "parameters by a named procedure that needs no start, such as two_mass or friction_curve"
+HELP = "parameters by a named procedure that needs no start, such as inverse_dynamics, two_mass or friction_curve"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

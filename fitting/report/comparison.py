@@ -9,7 +9,7 @@ from fitting.plots import plot_comparison
 from fitting.report.compared import Compared
 from fitting.report.content import Cell, Figure, Section, Table, number_cells
 from fitting.report.numbers import percent, plain
-from fitting.report.thinning import thinned
+from fitting.report.thinning import thinned, with_gaps
 
 
 def comparison_section(series: Sequence[Compared]) -> Section:
@@ -54,7 +54,7 @@ def comparison_section(series: Sequence[Compared]) -> Section:
 def _draw(members: list[Compared], axes: np.ndarray) -> None:
     for number, (ax, one) in enumerate(zip(axes, members, strict=True)):
         kept = thinned(ax, one.measured, one.simulated)
-        columns = one.times[kept], one.measured[kept], one.simulated[kept]
+        columns = with_gaps(one.times, kept, one.measured, one.simulated)
         plot_comparison(*columns, label=one.channel, unit=one.unit, ax=ax)
         legend = ax.get_legend()
         if number and legend is not None:

@@ -9,7 +9,7 @@ from fitting.plots import plot_residual
 from fitting.plots_diagnostics import plot_autocorrelation, plot_histogram, plot_spectrum
 from fitting.report.compared import Compared
 from fitting.report.content import Figure, Section
-from fitting.report.thinning import thinned
+from fitting.report.thinning import thinned, with_gaps
 from twin.record import Record
 
 _MOST = 8
@@ -104,7 +104,7 @@ def _over_time(one: Compared, unit: str, axes: np.ndarray) -> None:
     values = one.weighted if scale is not None and not single else one.error
     assert values is not None
     kept = thinned(ax, values)
-    ax.plot(one.times[kept], values[kept], color="C0", lw=0.6)
+    ax.plot(*with_gaps(one.times, kept, values), color="C0", lw=0.6)
     ax.axhline(0, color="0.4", lw=0.6)
     ax.set_xlabel("time [s]")
     ax.set_ylabel(f"{one.channel}\nresidual [{one.unit if single or scale is None else unit}]")

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _PIXELS_PER_INCH = 96
+# Steps longer than so many usual ones are gaps.
+_GAP = 3.0
 
 
 def thinned(ax: "Axes", *series: ArrayLike) -> np.ndarray:
@@ -25,6 +27,26 @@ def thinned(ax: "Axes", *series: ArrayLike) -> np.ndarray:
     figure = ax.get_figure(root=True)
     width = 7.0 if figure is None else figure.get_size_inches()[0]
     return extremes(series, int(_PIXELS_PER_INCH * width))
+
+
+def with_gaps(times: np.ndarray, kept: np.ndarray, *series: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The samples to draw, with a NaN where some were left out, so that no line is drawn across.
+
+    Args:
+        times: times of all samples (samples,) [s].
+        kept: numbers of the samples to draw, rising.
+        series: samples (samples,).
+
+    Returns:
+        Times, then each series.
+    """
+    steps = np.diff(times)
+    after = np.flatnonzero(steps > _GAP * np.median(steps)) if steps.size else np.empty(0, dtype=int)
+    places = np.searchsorted(kept, after, side="right")
+    return tuple(
+        np.insert(np.asarray(values, dtype=float)[kept], places, filling)
+        for values, filling in ((times, times[after]), *((one, np.nan) for one in series))
+    )
 
 
 def extremes(series: tuple[ArrayLike, ...], pixels: int) -> np.ndarray:

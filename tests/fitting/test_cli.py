@@ -137,3 +137,14 @@ def test_every_command_says_what_it_does(capsys):
     assert stop.value.code == 0
     printed = capsys.readouterr().out
     assert all(name in printed for name in ("demo", "reproduce", "study"))
+
+
+def test_an_error_of_the_program_does_not_pass_for_a_result(tmp_path, capsys, monkeypatch):
+    from fitting.commands import look
+
+    def broken(_):
+        raise ZeroDivisionError("nobody thought of it")
+
+    monkeypatch.setattr(look, "run", broken)
+    assert main(["look", str(tmp_path)]) == 4
+    assert "an error of drivetwin itself" in capsys.readouterr().err

@@ -95,7 +95,7 @@ def run(study: StudyFile, table: TomlTable, out: Path) -> Found:
     )
     # Named as in [free], and with the whole model.
     model = whole.with_values(study.model, jnp.asarray(plain.values))
-    result = dataclasses.replace(plain, space=whole, model=model)
+    result = dataclasses.replace(plain, space=whole, model=model, warning=_scale_told(study, prefix))
     write_fitted(study, out, whole, dict(zip(whole.paths, result.values.tolist(), strict=True)))
     compared = _compared(name, rows, result.values, deviation, unit)
     error = relative_error(compared.measured, compared.error)
@@ -130,6 +130,17 @@ def run(study: StudyFile, table: TomlTable, out: Path) -> Found:
         series=(compared,),
         remarks={name: [told, *(remark.removeprefix(f"{name}: ") for remark in one.remarks)]},
         derived=derived,
+    )
+
+
+def _scale_told(study: StudyFile, prefix: str) -> str:
+    """What the errors do not hold: the constants that turn the command into a force are taken as known."""
+    axis = study.model.plant if prefix else study.model
+    names = [name for name in _SCALES if hasattr(axis, name)]
+    listed = " and ".join(f"{name} = {float(getattr(axis, name)):.5g}" for name in names)
+    return (
+        f"All values hold for {listed}, taken as exact: by what these are wrong, in per cent, masses and forces are "
+        "wrong as well, whatever their standard errors."
     )
 
 

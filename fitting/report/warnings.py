@@ -45,11 +45,7 @@ def warnings_of(
         *_parameters(result, identifiability),
         *_starts(many),
         *_size(result),
-        *[
-            text
-            for name, values in (residuals or {}).items()
-            for text in _memory(name, np.asarray(values, dtype=float), result.correlated)
-        ],
+        *_memory(residuals or {}, result.correlated),
         *([result.warning] if result.warning else []),
     ]
 
@@ -137,28 +133,39 @@ def _size(result: FitResult) -> list[str]:
     ]
 
 
-def _memory(name: str, values: np.ndarray, allowed: bool) -> list[str]:
+def _memory(residuals: Mapping[str, ArrayLike], allowed: bool) -> list[str]:
+    """One sentence on all residuals that remember, so that many channels do not hide the other warnings."""
+    found = {name: said for name, values in residuals.items() if (said := _correlated(np.asarray(values, dtype=float)))}
+    if not found:
+        return []
+    if len(found) == 1:
+        ((name, said),) = found.items()
+        told = f"The residual of {name} is far from noise (autocorrelation {said})."
+    else:
+        listed = "; ".join(f"{name} ({said})" for name, said in found.items())
+        told = f"Residuals are far from noise, by their autocorrelation: {listed}."
+    if allowed:
+        return [f"{told} The model lacks something: look at the residual for its shape, and mend the model."]
+    return [
+        f"{told} The model lacks something, and standard errors that count its errors as independent are too small: "
+        "look at the residual for its shape, mend the model, or fit with correlated errors."
+    ]
+
+
+def _correlated(values: np.ndarray) -> str:
+    """The largest autocorrelation and its lag; empty for what may be noise."""
     values = values[np.isfinite(values)] if values.ndim == 1 else values.ravel()
     if values.size < 2 * _LAGS or values.std() == 0:
-        return []
+        return ""
     moving = values - values.mean()
     spectrum = np.fft.rfft(moving, 2 * values.size)
     correlation = np.fft.irfft(np.abs(spectrum) ** 2)[: _LAGS + 1]
     correlation = correlation / correlation[0]
     lag = int(np.argmax(np.abs(correlation[1:]))) + 1
     if abs(correlation[lag]) <= _MEMORY:
-        return []
+        return ""
     size = f"{correlation[lag]:.2f}".replace("-", "−")
-    found = (
-        f"The residual of {name} is far from noise (autocorrelation {size} at {lag} "
-        f"{'sample' if lag == 1 else 'samples'}). The model lacks something"
-    )
-    if allowed:
-        return [f"{found}: look at the residual for its shape, and mend the model."]
-    return [
-        f"{found}, and standard errors that count its errors as independent are too small: look at the residual for "
-        "its shape, mend the model, or fit with correlated errors."
-    ]
+    return f"{size} at {lag} {'sample' if lag == 1 else 'samples'}"
 
 
 def _listed(result: FitResult, paths: set[str]) -> str:

@@ -81,6 +81,8 @@ def test_residuals_with_a_memory(good):
     (text,) = warnings_of(dataclasses.replace(good, correlated=True), residuals={"run: speed": slow})
     assert "mend the model" in text
     assert "correlated errors" not in text
+    (text,) = warnings_of(good, residuals={"run: speed": slow, "run: force": slow})
+    assert "run: speed (0.9" in text and "run: force (0.9" in text
 
 
 def test_controls_that_failed(good):

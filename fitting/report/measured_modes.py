@@ -35,9 +35,9 @@ def measured_modes_report(analysis: ModalAnalysis, summary: Mapping[str, Any]) -
         sections=(
             _modes(analysis),
             _stabilisation(analysis),
-            _synthesis(analysis),
             _shapes(analysis),
             *((_mac(analysis),) if mac_tells(analysis) else ()),
+            _synthesis(analysis),
             _channels(analysis),
         ),
         facts=(

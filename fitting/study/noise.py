@@ -6,14 +6,14 @@ import numpy as np
 _WEIGHT = np.sqrt(20.0)
 _NORMAL = 1.4826
 # What a channel without any scatter, a simulated one, is taken to scatter by, relative to its range.
-LEAST = 1e-6
+LEAST = 1e-9
 
 
 def noise_deviation(values: np.ndarray) -> float:
     """Standard deviation of the white noise on a channel that is otherwise smooth from sample to sample.
 
     The median of its third differences, so that a few jumps do not count; at least the rounding of its own steps, and a
-    millionth of its range.
+    billionth of its range.
 
     Args:
         values: samples (samples,), at least 8.

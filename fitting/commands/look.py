@@ -61,6 +61,8 @@ def _modes(file: Path) -> Outcome | None:
     from twin.io._mode_list import listed_modes
     from twin.io.formats import universal
 
+    if not file.is_file():  # a pipe would wait for somebody to write
+        return None
     with file.open("rb") as stream:
         if not universal.matches(stream.read(256)):
             return None

@@ -56,12 +56,13 @@ def test_standstill_falsifies_friction_unless_it_is_left_out():
         {"position": "m", "force": "N"},
     )
     kept = inverse_dynamics(still, AXIS, SPACE)
-    assert abs(kept["friction.coulomb"].value - 20.0) > 0.5
     slowest = moving_speed(still)
     assert slowest == pytest.approx(0.02 * np.abs(velocity).max(), rel=0.01)
     rows = force_regression(still, AXIS, SPACE, slowest=slowest)
     assert rows.left_out > 0 and np.abs(rows.velocity).min() >= slowest
     moving = inverse_dynamics(still, AXIS, SPACE, slowest=slowest)
+    errors = [abs(one["friction.coulomb"].value - 20.0) for one in (kept, moving)]
+    assert errors[0] > 5 * errors[1]
     np.testing.assert_allclose(moving.values, [95.0, 200.0, 20.0, -3.0], rtol=5e-3)
     with pytest.raises(InputError, match="are as fast as 9 m/s"):
         force_regression(still, AXIS, SPACE, slowest=9.0)
